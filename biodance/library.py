@@ -73,17 +73,30 @@ def read_toml(path: Path) -> dict[str, Any]:
     refuse_special(path)
     try:
         refuse_large(path, _LARGEST_TEXT)
-        found = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-        _refuse_deep(found)
-        return found
-    except RecursionError as error:
-        raise FileRefused(f"{path}: tables or lists lie in each other too deeply. Write them flat.") from error
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise FileRefused(f"{path}: cannot be opened ({error.strerror}). Check the path.") from error
     except UnicodeDecodeError as error:
         raise FileRefused(f"{path}: is no text in UTF-8, so not valid TOML. Save it as UTF-8.") from error
+    return parse_toml(text, path)
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """Return the tables of a text that stands, or shall stand, in the file ``path``.
+
+    Raises
+    ------
+    FileRefused
+        It is not TOML, or nested without end.
+    """
+    try:
+        found = tomllib.loads(text)
+        _refuse_deep(found)
+        return found
+    except RecursionError as error:
+        raise FileRefused(f"{path}: tables or lists lie in each other too deeply. Write them flat.") from error
     except tomllib.TOMLDecodeError as error:
-        advice = "Write decimals with a point: 60.3." if _COMMA.search(_line(path, error)) else "Correct that line."
+        advice = "Write decimals with a point: 60.3." if _COMMA.search(_line(text, error)) else "Correct that line."
         raise FileRefused(f"{path}: is not valid TOML: {error}. {advice}") from error
 
 
@@ -136,10 +149,10 @@ def refuse_large(path: Path, largest: int) -> None:
         raise FileRefused(f"{path}: holds {size / 1e6:,.0f} MB, legal are up to {largest / 1e6:,.0f}. Check the file.")
 
 
-def _line(path: Path, error: tomllib.TOMLDecodeError) -> str:
-    """Return the line of a file that is no TOML; "" where the error names none (its attributes are of Python 3.14)."""
+def _line(text: str, error: tomllib.TOMLDecodeError) -> str:
+    """Return the line of a text that is no TOML; "" where the error names none (its attributes are of Python 3.14)."""
     place = re.search(r"line (\d+)", str(error))
-    return path.read_text(encoding="utf-8-sig").splitlines()[int(place[1]) - 1] if place else ""
+    return text.splitlines()[int(place[1]) - 1] if place else ""
 
 
 def refuse_special(path: Path) -> None:

@@ -25,36 +25,44 @@ _AHEAD = 2
 """Tasks sent to a cluster for each of its threads: the second waits where the first is worked on."""
 _FRESH = 50
 """Sessions after which a process is replaced, so that memory stays flat."""
+_ASKED = 0.2
+"""s between two looks at whether somebody has stopped the work."""
 
 
-def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Outcomes:
+def run_here(
+    tasks: Iterable[SessionTask], work: Work, *, workers: int, stop: threading.Event | None = None
+) -> Outcomes:
     """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
 
     A process that dies (killed, out of memory) is replaced and takes no other along; its session is tried again when
-    all others are finished, one at a time, and given up when it has lost its process `TRIES` times.
+    all others are finished, one at a time, and given up when it has lost its process `TRIES` times. Once another
+    thread sets ``stop``, what is at work is killed and nothing more is yielded.
     """
-    lost = deque[SessionTask]()
-    yield from _beside(deque(tasks), work, workers, lost)
+    lost, stop = deque[SessionTask](), stop or threading.Event()
+    yield from _beside(deque(tasks), work, workers, lost, stop)
     for _ in range(TRIES - 1):
         again, lost = lost, deque[SessionTask]()
-        yield from _beside(again, work, 1, lost)
+        yield from _beside(again, work, 1, lost, stop)
     for task in lost:
-        yield task, _killed(task)
+        if not stop.is_set():
+            yield task, _killed(task)
 
 
-def _beside(waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask]) -> Outcomes:
-    """Yield what is finished until all is; the tasks whose process died go to ``lost``.
+def _beside(
+    waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask], stop: threading.Event
+) -> Outcomes:
+    """Yield what is finished until all is, or ``stop`` is set; the tasks whose process died go to ``lost``.
 
     Each worker is a pool of one process: the death of a process ends every process of its pool.
     """
     free = [_process() for _ in range(min(workers, len(waiting)))]
     flying = dict[Future[Outcome], tuple[SessionTask, ProcessPoolExecutor]]()
     try:
-        while waiting or flying:
+        while (waiting or flying) and not stop.is_set():
             while waiting and free:
                 task, pool = waiting.popleft(), free.pop()
                 flying[_submitted(pool, work, task)] = task, pool
-            for future in wait(flying, return_when=FIRST_COMPLETED).done:
+            for future in wait(flying, timeout=_ASKED, return_when=FIRST_COMPLETED).done:
                 task, pool = flying.pop(future)
                 if isinstance(future.exception(), BrokenProcessPool):
                     pool.shutdown()
@@ -88,11 +96,18 @@ def _killed(task: SessionTask) -> Outcome:
     return untold(task, SessionStatus.FAILED, why, Why.MACHINE)
 
 
+def prepare_workers() -> None:
+    """Start the process from which workers are forked and let it load what they need, so that the first is quick."""
+    multiprocessing.get_context("forkserver").set_forkserver_preload(
+        ["biodance.pipeline.front", "biodance.report.write"]
+    )
+    start_forkserver()
+
+
 def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
+    prepare_workers()
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
-    start_forkserver()
     return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
 
 

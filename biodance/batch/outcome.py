@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from biodance.errors import FileRefused
+from biodance.lab.session.file import FILES
 from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import parse_json
 from biodance.version import __version__
 
 OUTCOME = "outcome.json"
 """In a session's folder: where it and the manifest are, the session is done."""
+TABLES = "tables"
+"""Folder of a session's tables, in that of its results."""
 TrialRows = tuple[dict[str, Any], ...]
 """One row of plain values for each trial."""
 
@@ -58,6 +61,8 @@ class SessionTask:
         Whether the page is drawn; numbers are written always.
     limit : float
         s after which the session is given up.
+    tables : bool
+        Whether the results are also written as tables, into the folder `TABLES`.
     """
 
     name: str
@@ -67,6 +72,7 @@ class SessionTask:
     chosen: tuple[str, ...] = ()
     pages: bool = True
     limit: float = 1800.0
+    tables: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,7 @@ class Outcome:
     def is_final(self, task: SessionTask) -> bool:
         """Return whether doing the ``task`` again, as it is asked for now, would give the same."""
         same = self.fingerprint == task.fingerprint
+        same &= not task.tables or self.unread or (Path(task.out) / TABLES).is_dir()
         return same and (self.why is Why.SESSION or (self.why is Why.LIMIT and task.limit <= self.limit))
 
     @property
@@ -123,12 +130,15 @@ def only_row(status: SessionStatus, reason: str) -> TrialRows:
 
 
 def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
-    """Return what changes when recordings, settings or version change: of names, sizes and times of the files."""
+    """Return what changes when recordings, settings or version change: of names, sizes and times of the files, those
+    that tell of the subject in the folder above included.
+    """
     seen = hashlib.sha256(repr((__version__, sorted(chosen))).encode())
-    for path in sorted(session.rglob("*")):
+    above = (session.resolve().parent / name for name in FILES)
+    for path in (*sorted(session.rglob("*")), *above):
         if path.is_file():
-            known = path.stat()
-            seen.update(repr((str(path.relative_to(session)), known.st_size, known.st_mtime_ns)).encode())
+            known, name = path.stat(), os.path.relpath(path, session)
+            seen.update(repr((name, known.st_size, known.st_mtime_ns)).encode())
     return seen.hexdigest()[:24]
 
 

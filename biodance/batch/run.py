@@ -214,7 +214,7 @@ def run_batch(
     if not tasks:
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
-    with _told_of_book(folder), closing(Ledger(folder, archive)) as ledger:
+    with told_of_book(folder), closing(Ledger(folder, archive)) as ledger:
         for part in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
             shutil.rmtree(part, ignore_errors=True)
         fresh = _work_off(tasks, ledger, workers, work, tell)
@@ -226,7 +226,7 @@ def run_batch(
 
 
 @contextmanager
-def _told_of_book(folder: Path) -> Iterator[None]:
+def told_of_book(folder: Path) -> Iterator[None]:
     """Raise BiodanceError where the book cannot be written or is none: sessions' folders tell what is done."""
     try:
         yield

@@ -17,6 +17,7 @@ from typing import Any
 
 from biodance.batch.outcome import (
     OUTCOME,
+    TABLES,
     Outcome,
     SessionStatus,
     SessionTask,
@@ -112,6 +113,8 @@ def _examined(
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
+    from biodance.report.files import write_tables
+    from biodance.report.tables.frames import session_tables
     from biodance.report.write import write_report
     from biodance.settings import assignments
 
@@ -120,7 +123,11 @@ def _examined(
     result, found = diagnosed_and_corrected(result, tell=tell)
     result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing")
-    document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)
+    moved = session_movement(result)
+    document = write_report(result, folder, diagnosis=found, movement=moved, drawn=task.pages)
+    if task.tables:
+        (folder / TABLES).mkdir()
+        write_tables(session_tables(result, found.diagnosis if found else None, moved), folder / TABLES)
     first = document["attention"][0]["text"] if document["attention"] else ""
     well = all(row["level"] == "note" for row in document["attention"])
     status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, compare, dance, diagnose, files, session, virtual
+from biodance.cli import archive, compare, dance, diagnose, files, session, virtual, window
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "run",
     "session",
     "virtual",
+    "window",
 ]
 
 

@@ -13,7 +13,7 @@ from biodance.lab.c3d.subject import FileEvent
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
-from biodance.records import SIDES, Array, Mask, Motion, Wrench, runs
+from biodance.records import SIDES, Array, LeftOutSpan, Mask, Motion, Wrench, runs
 
 # Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
 # and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
@@ -210,6 +210,16 @@ class Cycle:
     def times(self) -> Array:
         """Return the times (101,) s of `PERCENT`."""
         return self.start + PERCENT / 100 * self.duration
+
+
+_TOUCHES = 0.02
+"""s by which a cycle may reach into a span that is left out: its ends are events, known to some frames."""
+
+
+def is_left_out(cycle: Cycle, spans: Iterable[LeftOutSpan]) -> bool:
+    """Return whether a cycle reaches into one of the ``spans`` of its side, or of both sides."""
+    mine = (one for one in spans if one.side in ("", cycle.side))
+    return any(min(one.end, cycle.end) - max(one.start, cycle.start) > _TOUCHES for one in mine)
 
 
 def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:

@@ -18,6 +18,7 @@ from biodance.cycles.cut import (
     agreement_of_events,
     foot_events,
     gait_cycles,
+    is_left_out,
     joined_events,
     kinematic_events,
     repetitions,
@@ -215,7 +216,8 @@ def trial_movement(
     if contact is not None and feet is not None:
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
-    cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
     sure = np.zeros(motion.time.size, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
     curves, theirs = list[CycleCurve](), list[CycleCurve]()

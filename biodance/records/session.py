@@ -12,6 +12,7 @@ from biodance import display
 from biodance.errors import BiodanceError, TrialRefused, known_index
 from biodance.records.arrays import assign, by_name, rate_of
 from biodance.records.markers import Markers
+from biodance.records.recording import Defect, LeftOutSpan, Source
 from biodance.records.subject import Subject
 from biodance.records.wrench import Plate, Wrench
 from biodance.settings import USUAL, Settings
@@ -22,57 +23,6 @@ if TYPE_CHECKING:
 
 Role = Literal["static", "fit", "validate", "check", "skip"]
 ROLES: tuple[Role, ...] = ("static", "fit", "validate", "check", "skip")
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a trial came from.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    sha256 : str
-        Of its bytes.
-    format : str
-        What it was read as.
-    rate, analog_rate : float
-        Hz; NaN = none.
-    first_frame : int
-        Its number in the file.
-    """
-
-    path: Path
-    sha256: str
-    format: str
-    rate: float = float("nan")
-    analog_rate: float = float("nan")
-    first_frame: int = 1
-
-
-@dataclass(frozen=True)
-class Defect:
-    """What was wrong in a recording and was left out when it was read.
-
-    Parameters
-    ----------
-    effect : str
-        The cause, by its name among the effects (``dead_plate``).
-    target : str
-        Where: a plate (``plate1``); "" for the whole recording.
-    text : str
-        What was seen and done, one plain sentence.
-    size : float
-        Of it, NaN = none.
-    unit : str
-        Of the size.
-    """
-
-    effect: str
-    target: str
-    text: str
-    size: float = float("nan")
-    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +53,8 @@ class Trial:
         What the analyst chose when it was read.
     defects : tuple of Defect
         What was wrong in the recording and was left out.
+    left_out : tuple of LeftOutSpan
+        What the analyst leaves out.
 
     Examples
     --------
@@ -121,17 +73,13 @@ class Trial:
     warnings: tuple[str, ...] = ()
     settings: Settings = USUAL
     defects: tuple[Defect, ...] = ()
+    left_out: tuple[LeftOutSpan, ...] = ()
 
     def __post_init__(self) -> None:
         known_index("trial role", self.role, ROLES)
-        assign(
-            self,
-            plates=tuple(self.plates),
-            measurements=MappingProxyType(dict(self.measurements)),
-            history=tuple(self.history),
-            warnings=tuple(self.warnings),
-            defects=tuple(self.defects),
-        )
+        listed = ("plates", "history", "warnings", "defects", "left_out")
+        assign(self, **{name: tuple(getattr(self, name)) for name in listed})
+        assign(self, measurements=MappingProxyType(dict(self.measurements)))
 
     @property
     def worn(self) -> str:

@@ -98,7 +98,7 @@ def _parse_marker_set(path: Path) -> Contents:
     for name in ("aliases", "markers", "landmarks", "map"):
         if not isinstance(table.get(name, {}), dict):
             raise BiodanceError(f"{path}: [{name}] must be a table. Write [{name}] and one line per entry below it.")
-    short = _parse_map(table["map"], str(path)) if table.get("map") else None
+    short = parse_map(table["map"], str(path)) if table.get("map") else None
     markers = {label: _marker(path, label, fields) for label, fields in table.get("markers", {}).items()}
     markers |= short.markers if short else {}
     if not markers:
@@ -125,18 +125,24 @@ def _parse_marker_set(path: Path) -> Contents:
 
 
 def _read_map(path: Path) -> Contents:
-    """Read ``[markers] map`` of a session.toml; see `_parse_map`."""
+    """Read ``[markers] map`` of a session.toml; see `parse_map`."""
     table = read_toml(path).get("markers")
     given = table.get("map") if isinstance(table, dict) else None
     if not isinstance(given, dict) or not given:
         raise BiodanceError(
             f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
         )
-    return _parse_map(given, str(path))
+    return parse_map(given, str(path))
 
 
-def _parse_map(given: Mapping[str, Any], path: str) -> Contents:
-    """Return the marker set of a map of labels to landmarks or segments; ``path`` names where it stands."""
+def parse_map(given: Mapping[str, Any], path: str) -> Contents:
+    """Return the marker set of a map of labels to landmarks or segments; ``path`` names where it stands.
+
+    Raises
+    ------
+    BiodanceError
+        A place is no landmark and no segment, or one landmark is given to two labels.
+    """
     markers: dict[str, _SetMarker] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
@@ -350,7 +356,7 @@ def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
 def _guessed(name: str) -> MarkerSet:
     """Return the set of a guessed map, which its name holds."""
     given = json.loads(name.removeprefix(GUESSED))
-    return _made(name, _parse_map(given, "the guess from names and posture"), usual=True)
+    return _made(name, parse_map(given, "the guess from names and posture"), usual=True)
 
 
 def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:

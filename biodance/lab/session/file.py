@@ -27,6 +27,11 @@ that points up, by default z).
 ``[plates.plate1]`` gives or corrects a force plate: ``corners_m``, ``type``, ``channels``, ``sensitivity``,
 ``origin_m``, the ``foot`` that stands on it, ``use = false``.
 
+``[markers] drop = ["T10"]`` leaves markers out of every trial. In a table ``[trials.NAME]``, ``exchange = [["LKNE",
+"RKNE"], ["LANK", "RANK", 1.2, 3.4]]`` gives two labels each other's places, from 1.2 to 3.4 s or in the whole trial;
+``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out, ``[[2.5, 3.1, "right"]]`` the cycles
+of that foot alone (`spans`).
+
 ``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
 0.6`` what is worn there in kg, on top of ``mass_kg`` (`worn`).
 
@@ -36,9 +41,7 @@ A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder
 the session's own file leaves out.
 """
 
-import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date as day
 from datetime import datetime
@@ -47,211 +50,19 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from biodance.errors import BiodanceError, SessionRefused, TrialRefused
-from biodance.lab.c3d.raw import RawC3d, read_raw
-from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE, Told, ToldPlate, corners_in_lab
-from biodance.lab.plates.decode import DEEPEST
-from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT, channel_groups, plate_parameters
-from biodance.lab.readers.c3d import file_frame
+from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.markers.sets import parse_map
+from biodance.lab.plates.corners import Told, ToldPlate
+from biodance.lab.session.plate_entry import PlateEntry, told_plate
+from biodance.lab.session.spans import TrialParts, legal_exchanges, legal_spans
 from biodance.lab.session.worn import legal_devices, legal_prosthesis
 from biodance.lab.shape import legal_girths, traced_outline, typed_outline
-from biodance.library import read_toml
-from biodance.records import Array, FootSizes, Plate, Role, Session, Trial
+from biodance.library import parse_toml, read_toml
+from biodance.records import FootSizes, Role
 from biodance.records.attention import WARNING
 from biodance.settings import USUAL, Settings
-
-_ORDER = "in the order +x+y, -x+y, -x-y, +x-y of the plate's own axes"
-
-
-class _PlateEntry(BaseModel):
-    """One table ``[plates.NAME]``; None = not said. `_told_plate` checks the numbers."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    corners_m: Any = None
-    type: Any = None
-    channels: Any = None
-    sensitivity: Any = None
-    origin_m: Any = None
-    foot: Literal["left", "right"] | None = None
-    use: bool | None = None
-
-
-def _told_plate(name: str, entry: _PlateEntry) -> ToldPlate:
-    """Return what a table ``[plates.NAME]`` says."""
-    if not re.fullmatch(r"plate[1-9]\d?", name):
-        raise SessionRefused(f"[plates.{name}] is no plate. Legal names are plate1, plate2 ..., as inspect shows them.")
-    where = f"[plates.{name}]"
-    kind = _type(entry.type, where)
-    channels = _channels(entry.channels, kind, where)
-    return ToldPlate(
-        corners=_corners(entry.corners_m, where),
-        type=kind,
-        channels=channels,
-        sensitivity=_sensitivity(entry.sensitivity, kind, channels, where),
-        origin=_origin(entry.origin_m, where),
-        foot=entry.foot or "",
-        use=entry.use is not False,
-    )
-
-
-def _numbers(value: Any, where: str, legal: str) -> Array:
-    try:
-        numbers = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.array(np.nan)
-    if not np.isfinite(numbers).all():
-        raise SessionRefused(f"{where} = {value!r} is not legal. Write {legal}.")
-    return numbers
-
-
-def _corners(value: Any, where: str) -> Array | None:
-    if value is None:
-        return None
-    legal = f"four points [x, y, z] in m in the lab frame (z up), {_ORDER}"
-    corners = _numbers(value, f"{where} corners_m", legal)
-    if corners.shape != (4, 3):
-        raise SessionRefused(f"{where} corners_m has the shape {corners.shape}. Write {legal}.")
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-    if not SHORTEST_SIDE <= sides.min() <= sides.max() <= LONGEST_SIDE:
-        raise SessionRefused(
-            f"{where} corners_m make a plate with sides of {sides.min():.3g} to {sides.max():.3g} m; legal are "
-            f"{SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Write {legal}."
-        )
-    try:
-        return corners_in_lab(corners, metres=1.0, turn=np.eye(3))[0]
-    except TrialRefused as error:
-        said = str(error).replace("CORNERS", "corners_m").replace("FORCE_PLATFORM:corners_m", "corners_m")
-        raise SessionRefused(f"{where} {said}") from None
-
-
-def _type(value: Any, where: str) -> int | None:
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or value not in CHANNELS_OF_TYPE:
-        legal = ", ".join(map(str, CHANNELS_OF_TYPE))
-        raise SessionRefused(f"{where} type = {value!r} is not legal. Legal are the TYPEs {legal} of the C3D standard.")
-    return int(value)
-
-
-def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...] | None:
-    if value is None:
-        return None
-    legal = 'labels or numbers of analog channels, from 1: ["Fx1", "Fy1", ...] or [1, 2, 3, 4, 5, 6]'
-    listed = value if isinstance(value, list) else [None]
-    channels: list[Any] = [int(c) if isinstance(c, float) and c == round(c) and c >= 1 else c for c in listed]
-    if not all((isinstance(c, str) and c.strip()) or (type(c) is int and c >= 1) for c in channels):
-        raise SessionRefused(f"{where} channels = {value!r} is not legal. Write {legal}.")
-    counts = {CHANNELS_OF_TYPE[kind]} if kind else set(CHANNELS_OF_TYPE.values())
-    if len(channels) not in counts or len(set(channels)) < len(channels):
-        need = " or ".join(map(str, sorted(counts)))
-        of = f" of TYPE {kind}" if kind else ""
-        raise SessionRefused(f"{where} channels names {len(set(channels))} channels; a plate{of} has {need}.")
-    return tuple(channels)
-
-
-def _sensitivity(value: Any, kind: int | None, channels: tuple[str | int, ...] | None, where: str) -> Array | None:
-    """Return the matrix (rows, channels) of a list of numbers, which is its diagonal, or of a list of rows."""
-    if value is None:
-        return None
-    columns = CHANNELS_OF_TYPE[kind] if kind else len(channels or ()) or 6
-    rows = len(CONTENT[kind]) if kind else columns
-    legal = (
-        f"one number for each channel ({columns}), or {rows} rows of {columns} numbers: N and N·m per unit of the "
-        f"channel as the file gives it"
-    )
-    numbers = _numbers(value, f"{where} sensitivity", legal)
-    matrix = np.diag(numbers) if numbers.ndim == 1 else numbers
-    if matrix.shape != (rows, columns) or not matrix.any(axis=1).all():
-        of = f" of TYPE {kind}" if kind else ""
-        zero = " and holds a row of zeros" if matrix.shape == (rows, columns) else ""
-        raise SessionRefused(f"{where} sensitivity has the shape {numbers.shape}{zero}; a plate{of} needs {legal}.")
-    return matrix
-
-
-def _origin(value: Any, where: str) -> Array | None:
-    if value is None:
-        return None
-    legal = f"[x, y, z] in m from the sensor to the centre of the surface, z up to {DEEPEST:g} m, plate axes"
-    origin = _numbers(value, f"{where} origin_m", legal)
-    if origin.shape != (3,) or abs(origin[2]) > DEEPEST or np.abs(origin).max() > LONGEST_SIDE:
-        raise SessionRefused(f"{where} origin_m = {value!r} is not legal. Write {legal}.")
-    return origin
-
-
-_WRITTEN_ORDER = "# m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
-
-
-def plate_lines(session: Session) -> Iterator[str]:
-    """Yield the tables of all plates of a session, every line with a # before it."""
-    plates: dict[str, tuple[Plate, Trial]] = {}
-    for trial in session.trials:
-        for plate in trial.plates:
-            plates.setdefault(plate.name, (plate, trial))
-    hidden = None if plates else _undescribed(session)
-    if not plates and hidden is None:
-        return
-    yield "# Force plates: what stands here comes before what the files say. Take the # from the table's name and from"
-    yield "# what you correct."
-    for plate, trial in plates.values():
-        yield f"# [plates.{plate.name}] # as in {trial.name}"
-        corners = [[round(float(x), 5) for x in corner] for corner in plate.corners]
-        yield f"# corners_m = {json.dumps(corners)} {_WRITTEN_ORDER}"
-        if plate.type:
-            yield f"# type = {plate.type} # of the C3D standard"
-            yield from _channel_lines(*_channels_line(plate, trial))
-        yield from _use_lines()
-    if hidden is None:
-        return
-    raw, groups = hidden
-    for number, columns in enumerate(groups, start=1):
-        yield f"# [plates.plate{number}] # its channels are in {raw.path.name}, which does not describe it"
-        yield f"# corners_m = [[x, y, z], [x, y, z], [x, y, z], [x, y, z]] {_WRITTEN_ORDER}"
-        yield f"# type = {2 if len(columns) == 6 else 3} # of the C3D standard"
-        yield from _channel_lines([raw.analog_labels[column] for column in columns], (1.0,) * len(columns))
-        yield from _use_lines()
-
-
-def _undescribed(session: Session) -> tuple[RawC3d, tuple[tuple[int, ...], ...]] | None:
-    """Return the first file with channels that look like plates, and their columns."""
-    for trial in session.trials:
-        if trial.source.format == "C3D":
-            raw = read_raw(trial.source.path)
-            if groups := channel_groups(raw.analog_labels):
-                return raw, groups
-    return None
-
-
-def _channels_line(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:
-    """Return the labels (or numbers) of a plate's channels, and N or N·m per unit where there is no matrix."""
-    if trial.source.format != "C3D":
-        return [], ()
-    raw = read_raw(trial.source.path)
-    try:
-        found = plate_parameters(raw, int(plate.name.removeprefix("plate")), metres=file_frame(raw)[0])
-    except TrialRefused:
-        return [], ()
-    labels = [raw.analog_labels[column] for column in found.channels]
-    told = all(label and raw.analog_labels.count(label) == 1 for label in labels)
-    factors = () if found.calibration is not None else found.factors
-    return [*labels] if told else [column + 1 for column in found.channels], factors
-
-
-def _channel_lines(channels: Sequence[str | int], factors: tuple[float, ...]) -> Iterator[str]:
-    if channels:
-        yield f"# channels = {json.dumps(channels, ensure_ascii=False)} # labels, or numbers from 1"
-    if factors:
-        yield f"# sensitivity = {[*factors]} # N, N·m per unit of each channel as in the file; or rows of a matrix"
-
-
-def _use_lines() -> Iterator[str]:
-    yield '# foot = "left" # or "right", where the markers do not tell which foot stands on it'
-    yield "# use = false # leaves the plate out"
-    yield ""
-
 
 FILES = ("subject.toml", "session.toml")
 
@@ -291,13 +102,18 @@ class _TrialEntry(_Entry):
     """One table ``[trials.NAME]``."""
 
     role: Role | None = None
+    exchange: list[list[str | float]] | None = None
+    leave_out: list[list[float | str]] | None = None
 
 
 class _MarkersEntry(_Entry):
-    """The table ``[markers]``: the ``file`` (or name) of a set, or the ``map`` of labels to places."""
+    """The table ``[markers]``: the ``file`` (or name) of a set, or the ``map`` of labels to places; the labels to
+    ``drop``.
+    """
 
     file: str | None = None
     map: dict[str, str] | None = None
+    drop: list[str] | None = None
 
 
 class VisitEntry(_Entry):
@@ -314,7 +130,7 @@ class _Contents(_Entry):
     subject: SubjectEntry = SubjectEntry()
     markers: _MarkersEntry = _MarkersEntry()
     trials: dict[str, _TrialEntry] = {}
-    plates: dict[str, _PlateEntry] = {}
+    plates: dict[str, PlateEntry] = {}
     devices: dict[str, float] = {}
     settings: dict[str, Any] = {}
 
@@ -324,7 +140,7 @@ class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
     ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
     file of the set that was worn, "" where none is said (see `read_marker_set`); ``plates`` by name;
-    ``devices`` kg by segment.
+    ``devices`` kg by segment; ``dropped`` labels of markers that are not used.
     """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
@@ -335,6 +151,7 @@ class SessionFile:
     visit: VisitEntry = field(default_factory=VisitEntry)
     plates: Mapping[str, ToldPlate] = field(default_factory=dict)
     devices: Mapping[str, float] = field(default_factory=dict)
+    dropped: tuple[str, ...] = ()
 
     @property
     def told(self) -> Told:
@@ -343,9 +160,19 @@ class SessionFile:
 
     def role(self, name: str) -> Role | None:
         """Return the role of a trial: by its exact name, else by the first pattern; case does not count."""
-        exact = [entry.role for key, entry in self.trials if key.lower() == name.lower()]
-        similar = [entry.role for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
-        return next((role for role in exact + similar if role), None)
+        return next((entry.role for entry in self._about(name) if entry.role), None)
+
+    def parts(self, name: str) -> TrialParts:
+        """Return what is said of the parts of a trial: labels that change places, dropped markers, spans left out."""
+        about = self._about(name)
+        exchange = next((one.exchange for one in about if one.exchange is not None), None)
+        spans = next((one.leave_out for one in about if one.leave_out is not None), None)
+        return TrialParts(legal_exchanges(exchange), self.dropped, legal_spans(spans))
+
+    def _about(self, name: str) -> list[_TrialEntry]:
+        """Return what is said of a trial: by its exact name, then by patterns."""
+        exact = [entry for key, entry in self.trials if key.lower() == name.lower()]
+        return exact + [entry for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
 
     def unused(self, names: list[str]) -> list[str]:
         """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
@@ -380,7 +207,7 @@ def read_session_file(folder: Path) -> SessionFile:
     contents = [_read(path) for path in paths]
     said: dict[str, Any] = {}
     visit: dict[str, Any] = {}
-    plates: dict[str, _PlateEntry] = {}
+    plates: dict[str, PlateEntry] = {}
     for content in contents:
         plates |= {name: _over(plates.get(name), entry) for name, entry in content.plates.items()}
         said |= content.subject.model_dump(exclude_none=True)
@@ -388,16 +215,34 @@ def read_session_file(folder: Path) -> SessionFile:
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
     worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
     settings, marker_set = _settings(paths, contents), (worn or [""])[-1]
-    told = {name: _told_plate(name, entry) for name, entry in plates.items()}
+    told = {name: told_plate(name, entry) for name, entry in plates.items()}
     worn_kg = {segment: mass for content in contents for segment, mass in content.devices.items()}
     subject, day_of = SubjectEntry(**said), VisitEntry(**visit)
-    return SessionFile(subject, trials, tuple(paths), settings, marker_set, day_of, told, worn_kg)
+    dropped = tuple(dict.fromkeys(label for content in contents for label in content.markers.drop or ()))
+    return SessionFile(subject, trials, tuple(paths), settings, marker_set, day_of, told, worn_kg, dropped)
 
 
-def _over(earlier: _PlateEntry | None, entry: _PlateEntry) -> _PlateEntry:
+def check_session_text(path: Path, text: str) -> None:
+    """Refuse a ``text`` that would not be legal as the content of the session file ``path``.
+
+    Raises
+    ------
+    FileRefused
+        It is no TOML.
+    SessionRefused
+        It has an unknown key or a value that is not legal; the message says what would be.
+    """
+    content = _checked(path, parse_toml(text, path))
+    _settings([path], [content])
+    _marker_set(path, content.markers)
+    if content.markers.map:
+        parse_map(content.markers.map, str(path))
+
+
+def _over(earlier: PlateEntry | None, entry: PlateEntry) -> PlateEntry:
     """Return what an inner file says of a plate, filled in by an outer one."""
     said = earlier.model_dump(exclude_none=True) if earlier is not None else {}
-    return _PlateEntry(**{**said, **entry.model_dump(exclude_none=True)})
+    return PlateEntry(**{**said, **entry.model_dump(exclude_none=True)})
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
@@ -421,7 +266,10 @@ def _marker_set(path: Path, said: _MarkersEntry) -> str:
 
 
 def _read(path: Path) -> _Contents:
-    raw = read_toml(path)
+    return _checked(path, read_toml(path))
+
+
+def _checked(path: Path, raw: dict[str, Any]) -> _Contents:
     try:
         found = _beside(path, _Contents.model_validate(_whole_numbers_are_numbers(raw)))
         _ = found.subject.girths, found.subject.outlines
@@ -430,8 +278,9 @@ def _read(path: Path) -> _Contents:
     except ValidationError as error:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
     try:
-        _ = [_told_plate(name, entry) for name, entry in found.plates.items()]
+        _ = [told_plate(name, entry) for name, entry in found.plates.items()]
         _ = legal_prosthesis(found.subject.prosthesis), legal_devices(found.devices)
+        _ = [(legal_exchanges(one.exchange), legal_spans(one.leave_out)) for one in found.trials.values()]
     except SessionRefused as error:
         raise SessionRefused(f"{path}: {error}") from None
     return found
@@ -472,7 +321,7 @@ _TABLES: dict[str, type[BaseModel]] = {
     "subject": SubjectEntry,
     "trials": _TrialEntry,
     "markers": _MarkersEntry,
-    "plates": _PlateEntry,
+    "plates": PlateEntry,
 }
 _HELP = {
     "mass_kg": "Give the body mass in kg.",
@@ -489,4 +338,7 @@ _HELP = {
     "foot": 'Write "left" or "right"; leave it out where both stand on the plate.',
     "use": "Write false to leave the plate out.",
     "role": f"Legal are {', '.join(get_args(Role))}.",
+    "drop": 'Write the labels, for example ["T10", "RBAK"].',
+    "exchange": 'Write [["LKNE", "RKNE"]], or with from and to in s: [["LKNE", "RKNE", 1.2, 3.4]].',
+    "leave_out": 'Write spans from and to in s: [[2.5, 3.1]], or of one foot: [[2.5, 3.1, "right"]].',
 }

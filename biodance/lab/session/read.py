@@ -30,6 +30,7 @@ from biodance.lab.session.recordings import (
     role_by_name,
     vicon_notes,
 )
+from biodance.lab.session.spans import unused_labels, with_parts_corrected
 from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.records import Role, Session, Trial
@@ -135,7 +136,7 @@ def read_session(
     files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
-    reasons: dict[str, str] = {}
+    reasons, labels = dict[str, str](), set[str]()
     for file in files:
         operator = eclipse.get(file.stem.lower())
         role, reason = _role(file, folder, file_says, operator)
@@ -148,7 +149,10 @@ def read_session(
             trial = read_trial(
                 file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
             )
-            trial = _with_strikes(replace(trial, settings=chosen), operator)
+            labels.update(trial.markers.names if trial.markers is not None else ())
+            trial = with_parts_corrected(
+                _with_strikes(replace(trial, settings=chosen), operator), file_says.parts(file.stem)
+            )
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
@@ -166,17 +170,13 @@ def read_session(
     if marker_set is None:
         trials, guessed = dress(trials)
         notes += guessed
-    subject, guesses = identify_subject(
-        file_says.subject,
-        measurements,
-        trials,
-        name=subject_name or folder.resolve().name,
-        devices=file_says.devices,
-    )
+    called = subject_name or folder.resolve().name
+    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=called, devices=file_says.devices)
     read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
     slips = file_says.unused([file.stem for file in files])
     slips += file_says.unused_plates({plate.name for trial in trials for plate in trial.plates})
+    slips += unused_labels(file_says.dropped, labels)
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 

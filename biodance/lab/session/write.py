@@ -21,7 +21,8 @@ from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
-from biodance.lab.session.file import FILES, plate_lines
+from biodance.lab.session.file import FILES
+from biodance.lab.session.plate_entry import plate_lines
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench

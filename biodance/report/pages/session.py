@@ -6,7 +6,6 @@ folded, everything by trial.
 
 import math
 import re
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import unescape
@@ -21,7 +20,7 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.pipeline.trial_result import Check, TrialResult
-from biodance.records import CHANNELS, AngleState, Array
+from biodance.records import CHANNELS, AngleState
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.session import (
     FORCE_SCALE,
@@ -34,13 +33,10 @@ from biodance.report.figures.session import (
     wrench_figure,
 )
 from biodance.report.pages.identification import identification_section
-from biodance.report.pages.template import print_sheet, render, script_json, template_text, three_js
+from biodance.report.pages.template import packed_numbers, print_sheet, render, script_json, template_text, three_js
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import GAP_ROW
 from biodance.report.wording import format_number, millimetres, moment, trial_and_subject
-
-_UNKNOWN = -32768
-"""Whole number of a place that is not known."""
 
 
 def replay_data(found: SessionReplay) -> str:
@@ -81,18 +77,11 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
         "plates": one.plates.round(4),
         "origin": origin.round(4),
         "unit": unit,
-        "places": _packed((places - origin.round(4)) / unit),
-        "turns": _packed(32767 * one.rotations),
-        "forces": _packed(10 * forces),
+        "places": packed_numbers((places - origin.round(4)) / unit),
+        "turns": packed_numbers(32767 * one.rotations),
+        "forces": packed_numbers(10 * forces),
         "state": "".join(str(int(one)) for one in one.state),
     }
-
-
-def _packed(values: Array) -> str:
-    """Return values as whole numbers of 16 bits; what is not known or beyond them as `_UNKNOWN`."""
-    known = np.isfinite(values) & (np.abs(values) < -_UNKNOWN - 0.5)
-    whole = np.where(known, np.rint(np.where(known, values, 0.0)), _UNKNOWN).astype("<i2")
-    return b64encode(whole.tobytes()).decode("ascii")
 
 
 def replay_scripts() -> list[str]:

@@ -1,0 +1,164 @@
+"""The window's server: one user, this machine alone, every answer within a time and of a size that is known."""
+
+import secrets
+import socket
+import webbrowser
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from json import JSONDecodeError, loads
+from pathlib import Path
+from typing import Any
+
+import anyio
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from biodance.app.edits import ChangedElsewhereError
+from biodance.app.guard import LARGEST_BODY, LoopbackGuard
+from biodance.app.sessions import Archive
+from biodance.app.window import Asked, Window
+from biodance.batch.engines import prepare_workers
+from biodance.errors import BiodanceError, UnknownName
+from biodance.report.pages.template import three_js
+
+_PATIENCE = 10.0
+"""s that a request's body may take."""
+_KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+
+
+def _static_files() -> dict[str, bytes]:
+    """Return the window's own files by name: what is not among them cannot be asked for."""
+    folder = files("biodance.app") / "static"
+    found = {one.name: one.read_bytes() for one in folder.iterdir() if Path(one.name).suffix in _KINDS}
+    return found | {"three.js": three_js().encode()}
+
+
+def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGuard:
+    """Return the application that serves a window over an ``archive`` to who knows the ``token``, at ``port``."""
+    window, known = Window(archive), _static_files()
+
+    async def static(request: Request) -> Response:
+        name = request.path_params.get("name", "index.html")
+        if name not in known:
+            return Response("There is nothing here.", 404, media_type="text/plain")
+        return Response(known[name], media_type=_KINDS[Path(name).suffix])
+
+    reads = (window.listed, window.session, window.state, window.markers, window.forces, window.results)
+    writes = (window.edit, window.text, window.undo, window.redo, window.run, window.stop, window.accept, window.keep)
+    routes = [
+        Route("/", static),
+        Route("/static/{name}", static),
+        Route("/page", _answered(window.page)),
+        Route("/download", _answered(window.download)),
+        *(Route(f"/api/{one.__name__}", _answered(one)) for one in reads),
+        *(Route(f"/api/{one.__name__}", _answered(one), methods=["POST"]) for one in writes),
+    ]
+
+    @asynccontextmanager
+    async def ended(_: Starlette) -> AsyncIterator[None]:
+        yield
+        await run_in_threadpool(window.worker.stop)
+
+    application = Starlette(routes=routes, lifespan=ended, max_body_size=LARGEST_BODY)
+    return LoopbackGuard(application, token=token, port=port)
+
+
+def _answered(work: Callable[[Asked], Any]) -> Callable[[Request], Any]:
+    """Return an endpoint that does a ``work`` in a thread and answers with what it returns; with a sentence where that
+    is not possible.
+    """
+
+    async def endpoint(request: Request) -> Response:
+        try:
+            with anyio.fail_after(_PATIENCE):
+                body = await request.body()
+            asked = Asked(dict(request.query_params), loads(body) if body else {})
+            if not isinstance(asked.body, Mapping):
+                return _told("The body must be a JSON object.", 400)
+            found = await run_in_threadpool(work, asked)
+            return found if isinstance(found, Response) else JSONResponse(found)
+        except HTTPException:  # the body is larger than it may be
+            raise
+        except ChangedElsewhereError as error:
+            return _told(str(error), 409)
+        except UnknownName as error:
+            return _told(str(error), 404)
+        except BiodanceError as error:
+            return _told(str(error), 400)
+        except (JSONDecodeError, UnicodeDecodeError, RecursionError):
+            return _told("The body is no JSON.", 400)
+        except (TimeoutError, ClientDisconnect):
+            return _told("The request did not end in time.", 408)
+        except OSError as error:
+            return _told(f"{error.filename or 'The disk'}: {error.strerror or error}. Nothing was changed.", 507)
+        except Exception as error:
+            return _told(f"biodance itself failed ({type(error).__name__}: {error}). Please report this.", 500)
+
+    return endpoint
+
+
+def _told(sentence: str, status: int) -> JSONResponse:
+    return JSONResponse({"error": sentence}, status)
+
+
+def serve_window(
+    folder: Path, out: Path, *, port: int = 0, opened: bool = True, tell: Callable[[str], None] = lambda _: None
+) -> None:
+    """Serve a window over the sessions of a ``folder``, with results in ``out``, until Ctrl-C.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        An archive, or one session.
+    out : pathlib.Path
+        Of the results, as `run_batch` writes them.
+    port : int
+        Of 127.0.0.1; 0 takes a free one.
+    opened : bool
+        Whether the browser is asked to show it.
+    tell : callable
+        Called with the address, once it answers.
+
+    Raises
+    ------
+    BiodanceError
+        There is no session, the results' folder is taken, or the port.
+    """
+    archive = Archive(folder, out)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("127.0.0.1", port))
+    except (OSError, OverflowError) as error:
+        listener.close()
+        raise BiodanceError(
+            f"--port {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
+        ) from error
+    token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
+    application = window_application(archive, token=token, port=port)
+    address = f"http://127.0.0.1:{port}/?token={token}"
+    server = uvicorn.Server(
+        uvicorn.Config(
+            application,
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            timeout_keep_alive=30,
+            timeout_graceful_shutdown=5,
+            limit_concurrency=64,
+            lifespan="on",
+        )
+    )
+    listener.listen()
+    prepare_workers()
+    tell(address)
+    if opened:
+        webbrowser.open(address)
+    with listener:
+        server.run(sockets=[listener])

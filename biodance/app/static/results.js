@@ -1,0 +1,333 @@
+// What the last run found: verdict and reasons, the pages that it drew, its files; and what acceptance would change.
+import { ask, chip, download, h, number, put, say, tell, words } from "./dom.js";
+import { address } from "./main.js";
+import { showMarker } from "./markers.js";
+import { textEditor } from "./session.js";
+
+const CHANNELS = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
+
+async function resultsOf({ panel, view, name }) {
+  if (!view.found) {
+    put(panel, h("p", {}, "This session has not been run yet. Press Run."));
+    return null;
+  }
+  if (!view.found.fresh)
+    put(panel, h("p", { cls: "guess-word" }, "Something changed since this run. Run again to see what it changes."));
+  try {
+    return await ask("results", { name });
+  } catch (error) {
+    put(panel, h("p", { cls: "warn" }, view.found.reason || error.message));
+    return null;
+  }
+}
+
+function frame(name, part, title) {
+  return h("iframe", {
+    src: `/page?${new URLSearchParams({ name, part })}`,
+    title,
+    sandbox: "allow-scripts allow-popups",
+  });
+}
+
+export async function showGait(all) {
+  if (await resultsOf(all)) put(all.panel, frame(all.name, "gait", "What moved: curves and values of the last run"));
+}
+
+export async function showBody(all) {
+  if (await resultsOf(all))
+    put(all.panel, frame(all.name, "body", "The body of the last run, its replay and masses"));
+}
+
+export async function showQuality(all) {
+  const { panel, name } = all,
+    found = await resultsOf(all);
+  if (!found) return;
+  const [first, ...rest] = found.attention;
+  const acts = rest.filter((one) => one.level !== "note"),
+    notes = rest.filter((one) => one.level === "note");
+  const list = (rows) =>
+    h(
+      "ul",
+      {},
+      rows.map((one) => h("li", {}, one.trial ? h("strong", {}, `${one.trial}: `) : "", one.text)),
+    );
+  put(
+    panel,
+    first
+      ? h("p", { cls: `verdict ${first.level}` }, first.text)
+      : h("p", { cls: "verdict note" }, "Nothing needs a person."),
+    found.reasons.length
+      ? h(
+          "p",
+          {},
+          "Reasons: ",
+          found.reasons.map((one) => [chip(words(one)), " "]),
+        )
+      : "",
+    acts.length ? [h("h2", {}, "What needs a person"), list(acts)] : "",
+    notes.length
+      ? h("details", {}, h("summary", {}, `${notes.length} notes that ask nobody for anything`), list(notes))
+      : "",
+    h("h2", {}, "Findings"),
+    found.findings.length ? findings(found.findings, all) : h("p", {}, "No cause was found."),
+    acceptance(all, found),
+    h("h2", {}, "Seconds that this rests on"),
+    judged(found.judged),
+    h(
+      "details",
+      {},
+      h("summary", {}, "All checks by trial"),
+      frame(name, "quality", "Checks and trials of the last run"),
+    ),
+  );
+}
+
+function judged(rows) {
+  return h(
+    "table",
+    { cls: "stack" },
+    h(
+      "thead",
+      {},
+      h(
+        "tr",
+        {},
+        ["Recording", "Judged", "Left out", "Why not"].map((one) => h("th", { scope: "col" }, one)),
+      ),
+    ),
+    h(
+      "tbody",
+      {},
+      rows.map((one) =>
+        h(
+          "tr",
+          {},
+          h("th", { scope: "row" }, one.trial),
+          h("td", { cls: "n", "data-label": "Judged" }, `${number(one.seconds, 2)} s`),
+          h(
+            "td",
+            { "data-label": "Left out" },
+            Object.entries(one.left_out || {})
+              .map(([why, s]) => `${words(why)} ${number(s, 2)} s`)
+              .join(", ") || "nothing",
+          ),
+          h("td", { "data-label": one.why_not ? "Why not" : null }, one.why_not || ""),
+        ),
+      ),
+    ),
+  );
+}
+
+const size = (one) =>
+  Object.entries(one.parameters || {})
+    .map(
+      ([key, value]) =>
+        `${words(key)} ${[value.value]
+          .flat()
+          .map((x) => number(x, 3))
+          .join("; ")} ${value.unit === "1" ? "" : value.unit || ""}`,
+    )
+    .join(", ");
+
+function shownMarkers(one, { name, view }) {
+  // where a finding is about labels, the way to where they are exchanged
+  const labels = view.markers?.labels.map((row) => row.label) || [];
+  return (one.target || "")
+    .split("/")
+    .filter((label) => labels.includes(label))
+    .map((label) => [
+      h("a", { href: address(name, "markers"), onclick: () => showMarker(label) }, `Show ${label}`),
+      " ",
+    ]);
+}
+
+function findings(rows, all) {
+  return h(
+    "table",
+    { cls: "stack" },
+    h(
+      "thead",
+      {},
+      h(
+        "tr",
+        {},
+        ["Cause", "Size", "Probability", "What to do"].map((one) => h("th", { scope: "col" }, one)),
+      ),
+    ),
+    h(
+      "tbody",
+      {},
+      rows.map((one) =>
+        h(
+          "tr",
+          {},
+          h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
+          h("td", { "data-label": "Size" }, size(one)),
+          h(
+            "td",
+            { cls: "n", "data-label": "Probability" },
+            one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
+          ),
+          h("td", { "data-label": "What to do" }, one.advice || "", " ", shownMarkers(one, all)),
+        ),
+      ),
+    ),
+  );
+}
+
+function acceptance({ name }, found) {
+  // before and after first; only then can it be kept
+  if (!found.findings.length) return "";
+  const place = h("div", { "aria-live": "polite" });
+  const keep = async () => {
+    try {
+      const { folder } = await tell("keep", { name });
+      place.replaceChildren(h("p", {}, `Kept in ${folder}. Your recordings are as they were.`));
+    } catch (error) {
+      say(error.message);
+    }
+  };
+  const look = async () => {
+    place.replaceChildren(h("p", {}, "Working out before and after …"));
+    try {
+      const told = await tell("accept", { name });
+      const head = ["Recording", "", ...CHANNELS].map((one) =>
+        h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
+      );
+      const line = (one, when) =>
+        h(
+          "tr",
+          {},
+          h("th", { scope: "row" }, one.trial),
+          h("td", {}, when),
+          one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
+        );
+      place.replaceChildren(
+        told.residuals.length
+          ? h(
+              "div",
+              { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
+              h(
+                "table",
+                {},
+                h(
+                  "caption",
+                  {},
+                  "What plates and simulation differ by (RMS; N, N·m) as recorded, and with what was found taken off",
+                ),
+                h("thead", {}, h("tr", {}, head)),
+                h(
+                  "tbody",
+                  {},
+                  told.residuals.flatMap((one) => [line(one, "before"), line(one, "after")]),
+                ),
+              ),
+            )
+          : "",
+        told.written.length
+          ? h(
+              "div",
+              {},
+              h("h3", {}, "What would be written"),
+              h(
+                "ul",
+                {},
+                told.written.map((one) => h("li", {}, `${one.file}: ${one.what}`)),
+              ),
+            )
+          : h("p", {}, "There is nothing to accept: nothing would be written."),
+        told.not_applied.length
+          ? h(
+              "ul",
+              { cls: "small" },
+              told.not_applied.map((one) => h("li", {}, `Not applied: ${one.cause}, ${one.why}.`)),
+            )
+          : "",
+        told.written.length ? h("button", { cls: "main", onclick: keep }, "Accept: keep these files") : "",
+      );
+    } catch (error) {
+      say(error.message);
+      place.replaceChildren();
+    }
+  };
+  return h(
+    "div",
+    {},
+    h("div", { cls: "bar" }, h("button", { onclick: look, "data-key": "accept" }, "Accept … show before and after")),
+    place,
+  );
+}
+
+export async function showFiles(all) {
+  const { panel, view, name, changed } = all,
+    found = await resultsOf(all);
+  if (found) {
+    const trials = found.trials.filter((one) => one.status !== "refused").map((one) => one.name);
+    const trial = h(
+      "select",
+      { "aria-label": "Recording to export", onchange: () => links() },
+      trials.map((one) => h("option", { value: one }, one)),
+    );
+    const offered = h("div", { cls: "bar" });
+    const links = () =>
+      offered.replaceChildren(
+        ...found.exports.map((one) =>
+          download(
+            { name, format: one.format, ...(one.of_trial ? { trial: trial.value } : {}) },
+            one.format.toUpperCase(),
+          ),
+        ),
+      );
+    links();
+    put(
+      panel,
+      h("h2", {}, "Results"),
+      h(
+        "div",
+        { cls: "bar" },
+        h(
+          "a",
+          { cls: "button", href: `/page?${new URLSearchParams({ name })}`, target: "_blank", rel: "noopener" },
+          "Open the whole page (to print, PDF)",
+        ),
+        download({ name, format: "file", file: "report.html" }, "HTML"),
+        found.tables
+          ? [download({ name, format: "xlsx" }, "Excel"), download({ name, format: "csv" }, "CSV")]
+          : h("span", { cls: "small" }, "Run again for Excel and CSV."),
+      ),
+      h("h3", {}, "For other programs"),
+      h("div", { cls: "bar" }, h("label", {}, "C3D, TRC and MOT of ", trial)),
+      offered,
+      h(
+        "details",
+        {},
+        h("summary", {}, `All ${found.files.length} files, in ${found.folder}`),
+        h(
+          "ul",
+          {},
+          found.files.map((file) =>
+            h(
+              "li",
+              {},
+              h(
+                "a",
+                { href: `/download?${new URLSearchParams({ name, format: "file", file })}`, download: true },
+                file,
+              ),
+            ),
+          ),
+        ),
+      ),
+    );
+  }
+  put(
+    panel,
+    h("h2", {}, "session.toml"),
+    h(
+      "p",
+      { cls: "small" },
+      `${view.folder}/session.toml: all that this window changes. It is checked before it is saved; Undo goes back.`,
+    ),
+    textEditor(view, changed),
+  );
+}

@@ -1,0 +1,206 @@
+"""What a window shows of one session before anything is computed: trials, subject, markers, plates; as plain values."""
+
+import json
+import math
+from collections.abc import Iterator
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.app.sessions import SessionPlace
+from biodance.errors import BiodanceError
+from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.names import meanings_of, plain_labels
+from biodance.lab.markers.sets import GUESSED, LANDMARKS, MARKED_SEGMENTS, MarkerSet, read_marker_set
+from biodance.lab.markers.signals import report_gaps
+from biodance.lab.markers.upright import is_still, movement
+from biodance.lab.session.file import SessionFile, read_session_file
+from biodance.lab.session.plate_entry import plate_channels
+from biodance.lab.session.read import read_session
+from biodance.lab.session.recordings import find_recordings
+from biodance.records import ROLES, Plate, Session, Trial
+from biodance.report.tables.schema import plain_values
+
+
+class PlacedBy(StrEnum):
+    """How it is known what a marker marks."""
+
+    MAP = "map"
+    """session.toml says it."""
+    SET = "set"
+    """The marker set says it, which was recognised by its labels."""
+    NAME = "name"
+    """Guessed: its name says it."""
+    POSTURE = "posture"
+    """Guessed: it stands there on the standing person."""
+    NOBODY = "nobody"
+    """Nobody knows; it is not used."""
+
+
+class SessionView:
+    """One session as it is read now, kept until its recordings or its session.toml change."""
+
+    def __init__(self, place: SessionPlace) -> None:
+        self.place = place
+        self.stamp = place.task().fingerprint
+        self.session: Session | None = None
+        self.why = ""
+        self._said = SessionFile()
+        try:
+            self._said = read_session_file(place.folder)
+            self.session = read_session(place.folder)
+        except BiodanceError as error:
+            self.why = str(error)
+
+    def document(self) -> dict[str, Any]:
+        """Return what the tabs Trials and Markers show; ``why`` where the session cannot be read."""
+        undo, redo = self.place.file.steps
+        told: dict[str, Any] = {
+            "name": self.place.name,
+            "folder": str(self.place.folder),
+            "text": self.place.file.text,
+            "revision": self.place.file.revision,
+            "undo": undo,
+            "redo": redo,
+            "why": self.why,
+            "found": self.place.found(),
+            "roles": ROLES,
+            "segments": MARKED_SEGMENTS,
+        }
+        if self.session is not None:
+            told |= {
+                "subject": self._subject(self.session),
+                "trials": [*self._trials(self.session)],
+                "refused": dict(self.session.refused),
+                "notes": self.session.notes,
+                "markers": self._markers(self.session),
+                "plates": [*_plates(self.session, self._said)],
+            }
+        return dict(plain_values(told))
+
+    def _subject(self, session: Session) -> dict[str, Any]:
+        person, said = session.subject, self._said.subject
+        told = {"mass_kg": person.mass, "height_m": person.stature, "sex": person.sex, "age": person.age}
+        names = {"mass_kg": "mass", "height_m": "stature", "sex": "sex"}
+        rows = {
+            key: {
+                "value": None if isinstance(value, float) and math.isnan(value) else value,
+                "guessed": names.get(key) in person.guessed,
+                "told": getattr(said, key) is not None,
+            }
+            for key, value in told.items()
+        }
+        return {"name": person.name, **rows, "prosthesis": person.prosthesis, "devices": dict(person.devices)}
+
+    def _trials(self, session: Session) -> Iterator[dict[str, Any]]:
+        read = {trial.source.path: trial for trial in session.trials}
+        for path in find_recordings(self.place.folder)[0]:
+            trial, parts = read.get(path), self._said.parts(path.stem)
+            role = self._said.role(path.stem)
+            row: dict[str, Any] = {
+                "file": path.name,
+                "stem": path.stem,
+                "role": role or (trial.role if trial else ""),
+                "told": role is not None,
+                "why": session.refused.get(path.name, ""),
+                "exchange": [_exchange(one.one, one.other, one.start, one.end) for one in parts.exchanges],
+                "leave_out": [[one.start, one.end, *([one.side] if one.side else [])] for one in parts.left_out],
+            }
+            yield row | (_of_trial(trial) if trial else {"name": ""})
+
+    def _markers(self, session: Session) -> dict[str, Any]:
+        shown = [trial for trial in session.trials if trial.markers is not None]
+        leader = min(shown, key=lambda trial: (trial.role != "static", not trial.marker_set), default=None)
+        if leader is None:
+            return {"set": "", "guessed": False, "labels": [], "doubts": [], "landmarks": LANDMARKS}
+        guess = guess_set(leader.markers) if leader.markers and not self._said.marker_set else None
+        worn = read_marker_set(leader.marker_set) if leader.marker_set else None
+        labels = sorted({label for trial in shown if trial.markers for label in plain_labels(trial.markers.names)})
+        places = _places(worn) if worn else {}
+        named = meanings_of(labels)
+        gaps: dict[str, float] = {}
+        for trial in shown:
+            for one in report_gaps(trial.markers) if trial.markers else ():
+                gaps[one.label] = max(gaps.get(one.label, 0.0), one.percent)
+        rows = [
+            {
+                "label": label,
+                "place": places.get(label, ""),
+                "by": self._by(worn, label, places.get(label, ""), {one.place for one in named.get(label, ())}),
+                "gaps_percent": gaps.get(label, 0.0),
+                "trials": sum(label in trial.markers.names for trial in shown if trial.markers),
+            }
+            for label in labels
+        ]
+        guessed = bool(worn and worn.name.startswith(GUESSED))
+        return {
+            "set": worn.title if worn else "",
+            "guessed": guessed,
+            "labels": rows,
+            "dropped": self._said.dropped,
+            "doubts": guess.doubts if guess and (guessed or not worn) else [],
+            "landmarks": LANDMARKS,
+        }
+
+    def _by(self, worn: MarkerSet | None, label: str, place: str, named: set[str]) -> PlacedBy:
+        if not worn or not place:
+            return PlacedBy.NOBODY
+        if Path(worn.name).name in ("session.toml", "subject.toml"):
+            return PlacedBy.MAP
+        if not worn.name.startswith(GUESSED):
+            return PlacedBy.SET
+        return PlacedBy.NAME if place in named else PlacedBy.POSTURE
+
+
+def _places(worn: MarkerSet) -> dict[str, str]:
+    """Return label -> the landmark that it marks alone, else its segment, for every spelling that a file may have."""
+    if worn.name.startswith(GUESSED):
+        return dict(json.loads(worn.name.removeprefix(GUESSED)))
+    places = {marker.label: marker.segment for marker in worn.markers}
+    for landmark, alternatives in worn.landmarks.items():
+        if len(alternatives[0]) == 1:
+            places[alternatives[0][0]] = landmark
+    return places | {alias: places[label] for alias, label in worn.aliases.items() if label in places}
+
+
+def _exchange(one: str, other: str, start: float, end: float) -> list[Any]:
+    return [one, other, start, end] if math.isfinite(start) else [one, other]
+
+
+def _of_trial(trial: Trial) -> dict[str, Any]:
+    row = trial._row()
+    clock = trial.markers or (trial.plates[0].wrench if trial.plates else None)
+    return {
+        "name": trial.name,
+        "seconds": row["duration (s)"],
+        "rate_hz": row["rate (Hz)"],
+        "start_s": float(clock.time[0]) if clock is not None else 0.0,
+        "markers": row["markers"],
+        "travels_m": None if trial.markers is None or is_still(trial) else movement(trial.markers),
+        "plates": [plate.name for plate in trial.plates],
+        "warnings": [*trial.warnings, *(one.text for one in trial.defects)],
+    }
+
+
+def _plates(session: Session, said: SessionFile) -> Iterator[dict[str, Any]]:
+    """Yield every plate of the session, also those that are switched off."""
+    names = dict.fromkeys(plate.name for trial in session.trials for plate in trial.plates)
+    for name in dict.fromkeys([*names, *said.plates]):
+        told = said.plates.get(name)
+        on = [(trial, plate) for trial in session.trials for plate in trial.plates if plate.name == name]
+        row: dict[str, Any] = {"name": name, "use": told is None or told.use, "foot": told.foot if told else ""}
+        if on:
+            trial, plate = on[0]
+            labels, _ = plate_channels(plate, trial)
+            row |= {"type": plate.type, "corners_m": plate.corners.round(5), "placed": plate.placed}
+            row |= {"channels": labels, "decisions": plate.decisions}
+            row["loads"] = [{"trial": trial.name, **_load(plate)} for trial, plate in on]
+        yield row
+
+
+def _load(plate: Plate) -> dict[str, Any]:
+    force = plate.wrench.value[:, 2]
+    known = force[np.isfinite(force)]
+    return {"mean_n": float(known.mean()) if known.size else None, "most_n": float(known.max()) if known.size else None}

@@ -1,0 +1,100 @@
+"""Runs that a window asks for: one at a time, followed by their log, killed whole when they are stopped."""
+
+import fcntl
+import time
+from pathlib import Path
+
+import pytest
+from batch_work import count, die_in_s2, stuck
+
+from biodance.app.run import RunState, Worker
+from biodance.app.sessions import Archive
+from biodance.batch.run import Ledger
+from biodance.batch.summary import SESSIONS
+from biodance.errors import BiodanceError
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    """Four folders with a file that is no recording: enough for stand-ins, refused at once by the real work."""
+    for name in ("s0", "s1", "s2", "s3"):
+        (tmp_path / "archive" / name).mkdir(parents=True)
+        (tmp_path / "archive" / name / "static.c3d").write_bytes(b"no recording")
+    return Archive(tmp_path / "archive", tmp_path / "results")
+
+
+def ended(worker: Worker) -> dict:
+    end = time.monotonic() + 60
+    while worker.document()["state"] is RunState.RUNNING:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return worker.document()
+
+
+def test_a_run_goes_through_its_sessions_and_what_is_done_is_fresh(archive):
+    worker = Worker(archive, count)
+    assert worker.document() is None
+    worker.start([archive["s0"], archive["s1"]])
+    told = ended(worker)
+    assert (told["state"], told["done"]) == (RunState.FINISHED, 2)
+    found = {row["name"]: row["found"] for row in archive.rows()}
+    assert found["s0"]["status"] == "done"
+    assert found["s2"] is None
+    (archive["s0"].folder / "session.toml").write_text("[subject]\nage = 30\n")
+    assert not archive["s0"].found()["fresh"]
+
+
+def test_what_is_said_of_the_subject_in_the_folder_above_makes_results_old(archive):
+    before = archive["s1"].task().fingerprint
+    assert archive["s1"].task().fingerprint == before
+    (archive.folder / "subject.toml").write_text("[subject]\nage = 30\n")
+    assert archive["s1"].task().fingerprint != before
+
+
+def test_a_refused_session_says_why(archive):
+    worker = Worker(archive)
+    worker.start([archive["s0"]])
+    assert ended(worker)["state"] is RunState.FINISHED
+    found = archive["s0"].found()
+    assert found["status"] == "refused"
+    assert "static.c3d" in found["reason"]
+
+
+def test_a_killed_process_costs_its_own_session_alone(archive):
+    worker = Worker(archive, die_in_s2)
+    worker.start([archive["s2"], archive["s3"]])
+    assert ended(worker)["state"] is RunState.FINISHED
+    assert archive["s2"].found() is None
+    assert archive["s3"].found()["status"] == "done"
+
+
+def test_a_stop_kills_what_is_at_work_and_leaves_nothing_half_done(archive):
+    worker = Worker(archive, stuck)
+    worker.start([archive["s3"], archive["s0"]])
+    alive = archive["s3"].folder / "alive"
+    end = time.monotonic() + 60
+    while not (archive.out / SESSIONS / ".part-at-work").exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    with pytest.raises(BiodanceError, match="not finished"):
+        worker.start([archive["s0"]])
+    worker.stop()
+    with alive.open() as held:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody holds it any more
+    assert worker.document()["state"] is RunState.STOPPED
+    assert not list((archive.out / SESSIONS).glob(".part-*"))
+    assert archive["s0"].found() is None
+    worker.start([archive["s0"]])
+    assert ended(worker)["state"] is RunState.FINISHED
+
+
+def test_while_a_batch_writes_there_a_run_says_so(archive):
+    ledger = Ledger(archive.out, archive.folder)
+    try:
+        worker = Worker(archive, count)
+        worker.start([archive["s0"]])
+        told = ended(worker)
+    finally:
+        ledger.close()
+    assert told["state"] is RunState.FAILED
+    assert "another run is writing" in told["why"]

@@ -1,0 +1,189 @@
+"""The window in a real browser, as somebody uses it: from the folder to a download, on a desk and on a phone."""
+
+import select
+import subprocess
+import sys
+import time
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from accessible import ASKED, complaints
+from browser import Page
+from hidden_faults import hidden
+
+pytestmark = ASKED
+TABS = ("trials", "markers", "steps", "quality", "gait", "body", "files")
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("window") / "archive"
+    hidden(folder / "S01", trials=("static", "squat_1"))
+    (folder / "S02").mkdir()
+    (folder / "S02" / "static.c3d").write_bytes(b"no recording")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(archive: Path) -> Iterator[str]:
+    command = [sys.executable, "-m", "biodance", "app", str(archive), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert select.select([process.stdout], [], [], 60.0)[0]
+        yield process.stdout.readline().strip()
+        process.terminate()
+        process.wait(timeout=30)
+
+
+@pytest.fixture(scope="module")
+def browser(address: str) -> Iterator[Page]:
+    with Page(address) as page:
+        page.until("document.querySelectorAll('tbody tr').length === 2")
+        yield page
+
+
+def go(browser: Page, place: str, ready: str) -> None:
+    browser.run(f"location.hash = '{place}'")
+    browser.until(f"Boolean({ready})")
+
+
+def press(browser: Page, text: str) -> None:
+    browser.run(
+        f"[...document.querySelectorAll('button, a')].find(one => one.textContent.startsWith({text!r})).click()"
+    )
+
+
+def choose(browser: Page, field: str, value: str) -> None:
+    browser.run(
+        f"(one => {{ one.focus(); one.value = {value!r}; one.dispatchEvent(new Event('change')); }})"
+        f"(document.querySelector({field!r}))"
+    )
+
+
+def test_the_token_leaves_the_address(browser):
+    assert "token" not in browser.run("location.href")
+
+
+def test_a_role_is_changed_by_menu_and_undone(browser, archive):
+    file = archive / "S01" / "session.toml"
+    before = file.read_text(encoding="utf-8")
+    go(browser, "#/S01/trials", "document.querySelector('[data-key=\"role squat_1\"]')")
+    choose(browser, '[data-key="role squat_1"]', "fit")
+    browser.until("document.querySelector('[data-key=undo]').disabled === false")
+    assert tomllib.loads(file.read_text(encoding="utf-8"))["trials"]["squat_1"]["role"] == "fit"
+    browser.run("document.querySelector('[data-key=undo]').click()")
+    browser.until("document.querySelector('[data-key=redo]').disabled === false")
+    assert file.read_text(encoding="utf-8") == before
+
+
+def test_a_value_that_is_not_legal_is_said_and_the_old_one_shown(browser, archive):
+    go(browser, "#/S01/trials", "document.querySelector('[data-key=mass_kg]')")
+    before = browser.run("document.querySelector('[data-key=mass_kg]').value")
+    choose(browser, "[data-key=mass_kg]", "6400")
+    browser.until("!document.querySelector('#said').hidden")
+    assert "mass_kg" in browser.run("document.querySelector('#said').textContent")
+    browser.until(f"document.querySelector('[data-key=mass_kg]').value === {before!r}")
+
+
+def test_another_editor_is_noticed(browser, archive):
+    go(browser, "#/S01/trials", "document.querySelector('[data-key=age]')")
+    file = archive / "S01" / "session.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace("[subject]", "[subject]\nname = 'somebody'"), encoding="utf-8")
+    browser.until("document.querySelector('#said').textContent.includes('changed elsewhere')", 15)
+    browser.until("document.querySelector('legend').textContent.includes('somebody')")
+    file.write_text(before, encoding="utf-8")
+    browser.until("!document.querySelector('legend').textContent.includes('somebody')", 15)
+
+
+def test_two_markers_are_exchanged_by_a_click_in_the_picture(browser, archive):
+    go(browser, "#/S01/markers", "document.querySelector('canvas')")
+    time.sleep(0.5)  # one picture is drawn
+    box = browser.run(
+        "(b => [b.left, b.top, b.width, b.height])(document.querySelector('canvas').getBoundingClientRect())"
+    )
+    chosen = ""
+    for share in range(15, 90, 2):  # down the middle of the picture, until a marker is met
+        x, y = box[0] + box[2] / 2, box[1] + box[3] * share / 100
+        for kind in ("mousePressed", "mouseReleased"):
+            browser.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+        chosen = browser.run("document.querySelector('tr.chosen th')?.textContent || ''")
+        if chosen:
+            break
+    assert chosen
+    browser.run("document.querySelector('[data-key=exchange]').click()")
+    browser.until("[...document.querySelectorAll('li')].some(one => one.textContent.includes('exchanged'))")
+    (pair,) = tomllib.loads((archive / "S01" / "session.toml").read_text(encoding="utf-8"))["trials"]["squat_1"][
+        "exchange"
+    ]
+    assert pair[0] == chosen
+    press(browser, "Take back")
+    browser.until("![...document.querySelectorAll('li')].some(one => one.textContent.includes('exchanged'))")
+
+
+def test_from_the_folder_to_the_download(browser, archive, tmp_path):
+    go(browser, "#/", "document.querySelector('tbody a')")
+    press(browser, "S01")
+    browser.until("Boolean(document.querySelector('[data-key=run]'))")
+    browser.run("document.querySelector('[data-key=run]').click()")
+    browser.until("document.querySelector('#run').textContent.includes('Stop')", 20)
+    browser.until("document.querySelector('[data-key=run]')?.textContent === 'Results are up to date'", 240)
+    go(browser, "#/S01/files", "[...document.querySelectorAll('a')].some(one => one.textContent === 'Excel')")
+    browser.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    for text, name in (("Excel", "S01.xlsx"), ("CSV", "S01_tables.zip"), ("HTML", "report.html")):
+        press(browser, text)
+        end = time.monotonic() + 60
+        while not (tmp_path / name).exists():
+            assert time.monotonic() < end, name
+            time.sleep(0.1)
+    assert "xl/workbook.xml" in zipfile.ZipFile(tmp_path / "S01.xlsx").namelist()
+    assert "mean_curves.csv" in zipfile.ZipFile(tmp_path / "S01_tables.zip").namelist()
+
+
+def test_a_squat_is_switched_off_and_the_next_run_leaves_it_out(browser, archive):
+    rows = "document.querySelectorAll('tbody tr').length"
+    go(browser, "#/S01/steps", f"{rows} > 1")
+    before = browser.run(rows)
+    browser.run("document.querySelector('[data-key=\"cycle 0\"]').click()")
+    browser.until("Boolean(document.querySelector('tr.off'))")
+    browser.until("document.querySelector('[data-key=run]').textContent === 'Run'")
+    browser.run("document.querySelector('[data-key=run]').click()")
+    browser.until("document.querySelector('[data-key=run]').textContent === 'Results are up to date'", 240)
+    browser.until(f"{rows} === {before - 1}")
+
+
+@pytest.mark.parametrize("tab", TABS)
+def test_nobody_is_shut_out_of_a_tab(browser, tab):
+    go(browser, f"#/S01/{tab}", f"document.querySelector('#tab-{tab}')?.ariaSelected === 'true'")
+    browser.until("document.querySelector('#panel').children.length > 0")
+    time.sleep(0.5)
+    browser.run("document.querySelectorAll('details').forEach(one => one.open = true)")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+
+
+def test_nobody_is_shut_out_of_the_list_or_a_session_that_cannot_be_read(browser):
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    assert complaints(browser) == []
+    go(browser, "#/S02/trials", "document.querySelector('.verdict.fail')")
+    assert "static.c3d" in browser.run("document.querySelector('.verdict.fail').textContent")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+
+
+def test_tabs_are_reached_with_the_keyboard(browser):
+    go(browser, "#/S01/quality", "document.querySelector('#tab-quality')?.ariaSelected === 'true'")
+    browser.run("document.querySelector('#tab-quality').focus()")
+    browser.run(
+        "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
+    )
+    browser.until("document.activeElement.id === 'tab-gait' && document.activeElement.ariaSelected === 'true'")
+
+
+def test_nothing_is_asked_of_the_network_and_nothing_fails(browser, address):
+    assert {one.split("/")[2] for one in browser.asked() if "://" in one} == {address.split("/")[2]}
+    said = [one for one in browser.said() if "WebGL" not in one and "GL Driver" not in one]
+    assert [one for one in said if "400" not in one] == []  # the value that was not legal is answered with 400
