@@ -68,7 +68,7 @@ def repairs(
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
     """Yield a marker that has moved, if it lies so far from its place in the static trial that this explains where the
-    joint seemed to be; one that was wrong in the static trial, too, is a joint elsewhere, and where that trial
+    joint seemed to be, and farther than it lies by itself (two standard deviations); one that was wrong in the static trial, too, is a joint elsewhere, and where that trial
     contradicts itself beside the marker, nobody knows (`unplaced_markers`).
     """
     if error.spared not in effect.targets(cases[0]) or error.spared in unplaced_markers(cases[0].body):
@@ -77,7 +77,7 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
     shift = own.measured(np.zeros(3), *cases)
     alike = max(known.size(f"shown {own.name}"), known.size(key_of(own.name, error.spared)))
     sd = np.hypot(alike, known.model_error(own.name) * np.linalg.norm(shift))
-    if matters(own, shift) and np.linalg.norm(shift) >= _EXPLAINS * error.moved:
+    if matters(own, shift) and np.linalg.norm(shift) >= max(_EXPLAINS * error.moved, 2 * sd):
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 
 
