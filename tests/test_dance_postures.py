@@ -11,7 +11,7 @@ import pytest
 from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import condition, excitation_blocks, smooth_condition
+from biodance.dance.problem.excitation import condition, excitation_blocks, extremes, smooth_condition
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import PersonLimits, limit_body
@@ -22,7 +22,6 @@ from biodance.dance.search.postures import (
     KEPT,
     Posture,
     exchange,
-    extremes,
     image_feet,
     initial_guess,
     mirror_posture,

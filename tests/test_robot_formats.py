@@ -55,7 +55,7 @@ def test_parquet_and_text_say_what_csv_and_c3d_say(place: Path, tmp_path: Path) 
     assert [path.suffix for path in other.recorded.files] == [".parquet", ".csv"]
     assert other.plate.delay == pytest.approx(one.plate.delay, abs=0.002)
     assert other.plate.yaw == pytest.approx(one.plate.yaw, abs=0.002)
-    seen = [onto_plate(run.motion.fit.wrench.value, run.plate)[run.motion.fit.use] for run in (one, other)]
+    seen = [onto_plate(run.fit.wrench.value, run.plate)[run.fit.use] for run in (one, other)]
     np.testing.assert_allclose(seen[1][:, :3], seen[0][:, :3], atol=0.1)
 
 

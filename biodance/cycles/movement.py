@@ -219,14 +219,14 @@ def trial_movement(
     found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
     cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    sure = np.zeros(motion.time.size, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
+    sure = _fully_measured(contact, motion.time.size)
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
         theirs += file_curves(cycle, outputs, motion.time, own) if outputs else ()
         if contact is not None and feet is not None:
-            known = contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
+            known = _known_loads(cycle, contact)
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
             curves += ground_curves(cycle, body, motion, soles, feet, known)
     return TrialMovement(
@@ -240,11 +240,24 @@ def trial_movement(
         compare_events(events, outputs) if outputs else (),
         tuple(theirs),
         tuple(lift(one, centre, motion.time, weight, feet, sure) for one in cycles if one.kind != "gait"),
-        tuple(
-            one for one in cycles if one.kind == "gait" and contact and (_shared(contact) & _inside(one, contact)).any()
-        ),
+        tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
         _notes(cycles, contact),
     )
+
+
+def _known_loads(cycle: Cycle, contact: Contact) -> Mask:
+    """Return (T, 2) where the force under each foot counts; in gait not while both feet are on one plate."""
+    return contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
+
+
+def _fully_measured(contact: Contact | None, frames: int) -> Mask:
+    """Return (T,) where the plates tell the force under each foot; nowhere without plates."""
+    return np.zeros(frames, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
+
+
+def _on_one_plate(cycle: Cycle, contact: Contact | None) -> bool:
+    """Return whether both feet were on one plate at some time of a cycle."""
+    return contact is not None and bool((_shared(contact) & _inside(cycle, contact)).any())
 
 
 def _shared(contact: Contact) -> Mask:

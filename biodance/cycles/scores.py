@@ -1,8 +1,8 @@
 """How far a gait lies from a reference of healthy people, in one number: GPS with its MAP, and GDI."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,9 @@ _PELVIS = 3
 """The first of `SCORE_ANGLES` are the pelvis': both sides share them."""
 FEATURES = 15
 """Gait features that the index keeps (Schwartz and Rozumalski 2008: 98 % of the variance of their strides)."""
+
+
+_Key = TypeVar("_Key", bound=Hashable)
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,7 @@ def gait_scores(
     mean; a side's profile score the root mean square of its nine; that of both sides of 15: the pelvis counts once,
     with the left cycles (Baker et al. 2009, doi:10.1016/j.gaitpost.2009.05.020). The index: see `deviation_reference`.
     """
-    bands = {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
+    bands = _gait_bands(normal)
     vectors = gait_vectors(curves)
     if not set(SCORE_ANGLES) <= set(bands) or not vectors:
         return None
@@ -151,21 +154,24 @@ def gait_scores(
     }
     by_side = {side: [rows for cycle, rows in profile.items() if cycle.side == side] for side in SIDES}
     seen = {side: np.stack(rows) for side, rows in by_side.items() if rows}
-    variables = {
-        (name, side): told
-        for side, rows in seen.items()
-        for name, values in zip(SCORE_ANGLES, rows.T, strict=True)
-        if (told := spread(values))
-    }
-    gps = {side: told for side, rows in seen.items() if (told := spread(np.sqrt(np.mean(rows**2, axis=1))))}
-    gdi = {
-        side: told
-        for side in seen
-        if deviation is not None
-        if (told := spread(deviation.index(one) for cycle, one in vectors.items() if cycle.side == side))
-    }
+    variables = _known_spreads(
+        {(name, side): rows[:, k] for side, rows in seen.items() for k, name in enumerate(SCORE_ANGLES)}
+    )
+    gps = _known_spreads({side: np.sqrt(np.mean(rows**2, axis=1)) for side, rows in seen.items()})
+    index = {cycle: deviation.index(one) for cycle, one in vectors.items()} if deviation is not None else {}
+    gdi = _known_spreads({side: [value for cycle, value in index.items() if cycle.side == side] for side in seen})
     people = min(bands[name].people for name in SCORE_ANGLES)
     return GaitScores(variables, gps, _overall(seen), gdi, people)
+
+
+def _gait_bands(normal: Sequence[NormalCurve]) -> dict[str, NormalCurve]:
+    """Return the reference's angles in gait by their names."""
+    return {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
+
+
+def _known_spreads(values: Mapping[_Key, Iterable[float]]) -> dict[_Key, Spread]:
+    """Return mean, sd and number of the values of each key, without the keys of which none is known."""
+    return {key: told for key, some in values.items() if (told := spread(some))}
 
 
 def _overall(seen: Mapping[str, Array]) -> float:

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from itertools import chain
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -37,6 +39,14 @@ class LeftOutBecause(Enum):
     """It leaves all others of its kind far behind: a marker or a plate jumped."""
     TURN = "turn"
     """The person turned: its angles are not those of straight walking."""
+
+
+class _OfCycle(Protocol):
+    @property
+    def cycle(self) -> Cycle: ...
+
+
+_Of = TypeVar("_Of", bound=_OfCycle)
 
 
 @dataclass(frozen=True)
@@ -203,30 +213,30 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     doi:10.1016/j.gaitpost.2014.12.004, who rank strides by it); a plate under both feet the loads of a gait cycle.
     """
     cycles = tuple(one for trial in trials for one in trial.cycles if one.kind == kind)
-    curves = [one for trial in trials for one in trial.curves if one.cycle.kind == kind]
-    turned = [one.cycle for one in curves if one.quantity == "pelvis_rotation" and kind == "gait" and _turns(one.value)]
-    straight = [one for one in curves if one.cycle not in turned]
-    spikes = [one for same in _same(straight) for one in _spikes(same)]
+    turned = _turned(trials) if kind == "gait" else []
+    curves = _counted((trial.curves for trial in trials), kind, turned)
+    values = _counted(((*trial.strides, *trial.lifts) for trial in trials), kind, turned)
+    theirs = _counted((trial.file_curves for trial in trials), kind, turned)
     shared = [one for trial in trials for one in trial.shared if one.kind == kind and one not in turned]
-    return Repetitions(
-        kind,
-        cycles,
-        tuple(one for one in straight if one not in spikes),
-        tuple(
-            one
-            for trial in trials
-            for one in (*trial.strides, *trial.lifts)
-            if one.cycle.kind == kind and one.cycle not in turned
-        ),
-        (
-            *(LeftOutCurve(one, "", LeftOutBecause.TURN) for one in turned),
-            *(LeftOutCurve(one, "loads", LeftOutBecause.SHARED_PLATE) for one in shared),
-            *(LeftOutCurve(one.cycle, one.quantity, LeftOutBecause.SPIKE) for one in spikes),
-        ),
-        tuple(
-            one for trial in trials for one in trial.file_curves if one.cycle.kind == kind and one.cycle not in turned
-        ),
+    spikes = [one for same in _same(curves) for one in _spikes(same)]
+    left_out = (
+        *(LeftOutCurve(one, "", LeftOutBecause.TURN) for one in turned),
+        *(LeftOutCurve(one, "loads", LeftOutBecause.SHARED_PLATE) for one in shared),
+        *(LeftOutCurve(one.cycle, one.quantity, LeftOutBecause.SPIKE) for one in spikes),
     )
+    kept = tuple(one for one in curves if one not in spikes)
+    return Repetitions(kind, cycles, kept, values, left_out, theirs)
+
+
+def _counted(some: Iterable[Iterable[_Of]], kind: str, turned: Sequence[Cycle]) -> tuple[_Of, ...]:
+    """Return what is of cycles of a ``kind``, without those of cycles that were ``turned``."""
+    return tuple(one for one in chain.from_iterable(some) if one.cycle.kind == kind and one.cycle not in turned)
+
+
+def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
+    """Return the gait cycles during which the pelvis turns."""
+    curves = [one for trial in trials for one in trial.curves if one.quantity == "pelvis_rotation"]
+    return [one.cycle for one in curves if one.cycle.kind == "gait" and _turns(one.value)]
 
 
 def _turns(rotation: Array) -> bool:

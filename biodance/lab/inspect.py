@@ -12,7 +12,7 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
-from biodance.lab.markers.signals import report_gaps
+from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.corners import Told
 from biodance.lab.read import read_trial, reader_of
@@ -104,27 +104,23 @@ def inspect_file(
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)
     gaps = report_gaps(of_set) if (of_set := _of_the_set(trial)) is not None else ()
-    never = [gap.label for gap in gaps if gap.percent >= 100.0]
-    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed]
-    if never:
-        warnings.append(f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}.")
+    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed, *_never_seen(gaps)]
     plates = [_plate(plate) for plate in trial.plates]
-    clock = trial.markers or next((plate.wrench for plate in trial.plates), None)
+    clocks = [*([trial.markers.time] if trial.markers else ()), *(plate.wrench.time for plate in trial.plates)]
     as_read = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]
-    hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
     worn = trial.marker_set
     return {
         "file": str(path),
         "status": "warning" if warnings else "ok",
         "reason": warnings[0] if warnings else None,
         "format": trial.source.format,
-        "frames": 0 if clock is None else int(clock.time.size),
+        "frames": int(clocks[0].size) if clocks else 0,
         "rate_hz": _number(trial.source.rate),
         "analog_rate_hz": _number(trial.source.analog_rate),
         "markers": list(trial.markers.names) if trial.markers is not None else [],
         "marker_set": trial.worn or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
-        "gaps_percent": float(np.mean(hidden)) if hidden else None,
+        "gaps_percent": _mean_gap(gaps),
         "subjects": _subjects(path),
         "plates": plates,
         "mean_vertical_n": float(sum(as_read)) if as_read else None,
@@ -134,6 +130,18 @@ def inspect_file(
         "history": list(trial.history),
         "warnings": warnings,
     }
+
+
+def _never_seen(gaps: Sequence[MarkerGaps]) -> list[str]:
+    """Say which markers were never seen, if any."""
+    never = [gap.label for gap in gaps if gap.percent >= 100.0]
+    return [f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}."] if never else []
+
+
+def _mean_gap(gaps: Sequence[MarkerGaps]) -> float | None:
+    """Return the mean share of gaps, per cent, of the markers that were seen at all; None without one."""
+    hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
+    return float(np.mean(hidden)) if hidden else None
 
 
 def _guessed(trial: Trial) -> tuple[Trial, list[str]]:

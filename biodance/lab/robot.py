@@ -303,18 +303,21 @@ def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path,
             f"recording is a CSV or Parquet file of encoders and a C3D, AMTI or CSV file of the plate."
         )
     if len(tables) == len(plates) == 1:
-        name = _stem(tables[0])
-        return {name: (_role(name), (tables[0], plates[0]))}
-    found: dict[str, tuple[Role, tuple[Path, Path]]] = {}
-    for table in tables:
-        same = [plate for plate in plates if _stem(plate) == _stem(table)]
-        if len(same) != 1:
-            raise SessionRefused(
-                f"{folder}: which plate file belongs to {table.name}? Give both the same stem, as walk_joints.csv and "
-                f"walk_plate.c3d, or say it in {_FILE}: [trials.{_stem(table)}] encoders, plate, role."
-            )
-        found[_stem(table)] = (_role(_stem(table)), (table, same[0]))
-    return found
+        pairs = [(tables[0], plates[0])]
+    else:
+        pairs = [(table, _plate_of(table, plates)) for table in tables]
+    return {(name := _stem(table)): (_role(name), (table, plate)) for table, plate in pairs}
+
+
+def _plate_of(table: Path, plates: list[Path]) -> Path:
+    """Return the only plate file of the same stem as a table of encoders."""
+    same = [plate for plate in plates if _stem(plate) == _stem(table)]
+    if len(same) != 1:
+        raise SessionRefused(
+            f"{table.parent}: which plate file belongs to {table.name}? Give both the same stem, as walk_joints.csv "
+            f"and walk_plate.c3d, or say it in {_FILE}: [trials.{_stem(table)}] encoders, plate, role."
+        )
+    return same[0]
 
 
 def _stem(path: Path) -> str:

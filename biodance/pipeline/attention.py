@@ -42,24 +42,43 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     """
     judged = stepped(judged, one.witnesses)
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
-    found = [spaced(finding.target) for finding in one.findings if finding.target]
-    doubts = [text for text in result.doubts if not any(target in text for target in found)]
-    if one.faults and (outside or doubts or any(row.missed for row in judged)):
-        one = replace(one, explained=False)
-    if not (one.faults or one.explained or one.adequacy):
-        well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
-        one = replace(one, explained=well, why={**one.why, Reason.NOT_COMPARED: ()})
-    if one.is_clean and (against := _not_clean(result, judged, outside)):
-        one = replace(one, explained=False, why={**against, **one.why})
-    if not (one.faults or one.explained):
-        if not any(row.seconds > 0 for row in judged):
-            one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
-        if any(step.name == "subject" and step.status != "done" for step in result.steps):
-            one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
+    if one.faults:
+        one = replace(one, explained=one.explained and not _more_is_wrong(one, result, judged, outside))
+    else:
+        one = _without_faults(one, result, judged, outside)
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
     others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
     return replace(one, attention=(first, *others))
+
+
+def _more_is_wrong(
+    one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...], outside: tuple[Check, ...]
+) -> bool:
+    """Return whether something is open beside the causes that are named: a check, a doubt of the body that no finding
+    concerns, a trial that nobody judged.
+    """
+    found = [spaced(finding.target) for finding in one.findings if finding.target]
+    doubts = [text for text in result.doubts if not any(target in text for target in found)]
+    return bool(outside or doubts or any(row.missed for row in judged))
+
+
+def _without_faults(
+    one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...], outside: tuple[Check, ...]
+) -> Diagnosis:
+    """Return a diagnosis that names no fault with whether nothing is wrong, or why nobody can tell."""
+    if not (one.explained or one.adequacy):
+        well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
+        one = replace(one, explained=well, why={**one.why, Reason.NOT_COMPARED: ()})
+    if one.explained and (against := _not_clean(result, judged, outside)):
+        one = replace(one, explained=False, why={**against, **one.why})
+    if one.explained:
+        return one
+    if not any(row.seconds > 0 for row in judged):
+        one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
+    if any(step.name == "subject" and step.status != "done" for step in result.steps):
+        one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
+    return one
 
 
 def _compared_by_steps(result: SessionResult, judged: tuple[Judged, ...]) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.of_family import of_family
-from biodance.diagnosis.own_tolerances import own_tolerances
+from biodance.diagnosis.own_tolerances import SessionTolerances, own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
@@ -18,6 +18,7 @@ from biodance.effects import Cause, DiscreteEffect, Effect, causes, check_qualit
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.identification.added_mass import LoadSearch
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
@@ -64,9 +65,7 @@ def diagnose_session(
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     tell("looking for faults too large for statistics")
-    family = causes(effects)
-    if "mass" in result.session.subject.guessed:  # nobody declared one that could be wrong: the plates weighed it
-        family = {name: one for name, one in family.items() if name != BodyMass.name} or family
+    family = _suspects(effects, result)
     right = with_right_labels(result, reference=reference, tell=tell) if LabelsSwapped.name in family else None
     mended = with_faults_undone(right.result if right else result, right, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result
@@ -82,9 +81,23 @@ def diagnose_session(
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = of_family(replace(whole, findings=with_plate_axes(whole.findings, plates)), family)
     result = with_weighed_load(result, whole)
-    searched = result.identification and not any(one.cause.of_person() for one in whole.findings)
-    whole = with_load(whole, result.identification.search if result.identification and searched else None)
+    whole = with_load(whole, _load_of(result, whole))
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, found.looked_at)))
+
+
+def _suspects(effects: Chosen[Effect | DiscreteEffect], result: SessionResult) -> Mapping[str, Cause]:
+    """Return the causes that may be named; a declared mass is none where nobody declared one: the plates weighed it."""
+    family = causes(effects)
+    if "mass" not in result.session.subject.guessed:
+        return family
+    return {name: one for name, one in family.items() if name != BodyMass.name} or family
+
+
+def _load_of(result: SessionResult, whole: Diagnosis) -> LoadSearch | None:
+    """Return the search for a load; None without one, or where a cause in the person is named already."""
+    if result.identification is None or any(one.cause.of_person() for one in whole.findings):
+        return None
+    return result.identification.search
 
 
 def _judged(
@@ -120,24 +133,23 @@ def _judged(
         except TrialRefused as why:
             bare = replace(bare, notes=(str(why), *bare.notes))
         else:
-            notes = (
-                *_reference_note(reference),
-                *bare.notes,
-                *standing_notes(result),
-                *left_out(result.trials),
-                *own.notes,
-            )
-            unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
-            joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
-            # new joints of a sound body may be judged; of a doubtful one they excuse anything
-            reasons = {Reason.UNDESCRIBED_JOINTS: joints} if joints and result.doubts else {}
-            reasons |= {reason: () for reason, holds in unsure.items() if holds}
-            bare, looked_at = replace(bare, notes=notes, why=reasons), seen.problem.looked_at
-            simulate = simulate and not reasons
+            session = (*_reference_note(reference), *bare.notes, *standing_notes(result), *left_out(result.trials))
+            reasons = _body_reasons(result, own)
+            bare = replace(bare, notes=(*session, *own.notes), why=reasons)
+            looked_at, simulate = seen.problem.looked_at, simulate and not reasons
     found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
     tell("measuring what the findings change")
     told = replace(_with_gains(result, found), looked_at=looked_at)
     return replace(told, diagnosis=with_failed(failed, told.diagnosis)) if failed else told
+
+
+def _body_reasons(result: SessionResult, own: SessionTolerances) -> dict[Reason, tuple[str, ...]]:
+    """Return why forces simulated with this body prove nothing, each reason with what it concerns."""
+    joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
+    # new joints of a sound body may be judged; of a doubtful one they excuse anything
+    reasons = {Reason.UNDESCRIBED_JOINTS: joints} if joints and result.doubts else {}
+    unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
+    return reasons | {reason: () for reason, holds in unsure.items() if holds}
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.solids import shape_parts
+from biodance.identification.added_mass import LoadSearch
 from biodance.identification.validation import TrialValidation
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.results import SessionResult
@@ -64,24 +65,31 @@ class SessionReplay:
 def frames_of(result: SessionResult) -> SessionReplay | None:
     """Return the replay of a session; None where no trial has a motion."""
     body, found = result.body, result.identification
-    told = [one for one in result.trials if one.motion is not None and one.trial.markers is not None]
-    moving = [one for one in told if one.motion is not None and one.motion.time.size > 1]
+    moving = [
+        (one, one.motion) for one in result.trials if one.motion and one.motion.time.size > 1 and one.trial.markers
+    ]
     if body is None or not moving:
         return None
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
-    frames = sum(one.motion.time.size / one.motion.rate for one in moving if one.motion)
-    rate = min(_FASTEST, _FRAMES / max(frames, 1e-9))
+    seconds = sum(motion.time.size / motion.rate for _, motion in moving)
+    rate = min(_FASTEST, _FRAMES / max(seconds, 1e-9))
     whole, body = body, parts_as_segments(body)
     parts = shape_parts(body)
-    best = found.search.best if found and found.search.found else None
-    placed = best is not None and bool(np.isfinite(best.place).all())
     return SessionReplay(
-        tuple(_trial(whole, body, one, rate, validated) for one in moving),
+        tuple(_trial(whole, body, one, rate, validated) for one, _ in moving),
         np.reshape([box for _, box in parts], (-1, 2, 3)),
         tuple(segment for segment, _ in parts),
         tuple(side_in_name(body.segments[k]) for k, _ in parts),
-        (body.segment_index(best.segment), best.place) if best is not None and placed else None,
+        _load_place(body, found.search) if found else None,
     )
+
+
+def _load_place(body: Body, search: LoadSearch) -> tuple[int, Array] | None:
+    """Return the segment's index and the place (3,) m of the load that was found; None where none, or its place is not
+    known.
+    """
+    best = search.best if search.found else None
+    return (body.segment_index(best.segment), best.place) if best and np.isfinite(best.place).all() else None
 
 
 def _trial(

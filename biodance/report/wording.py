@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+from biodance.diagnosis.diagnosis import ABOUT
 from biodance.display import SHOWN_UNITS, cause_in_words, spaced
 from biodance.identification.knowledge import SIGMAS
-from biodance.records.attention import Attention
+from biodance.records.attention import Attention, told_together
 
 _ABSURD = 30.0
 """Typical sizes above which a size from which something is seen means never."""
@@ -119,6 +120,20 @@ def _size_in_words(row: dict[str, Any]) -> str:
 def size_seen(value: float | None, typical: float, unit: str) -> str:
     """Return a size from which a cause is seen or told as a person says it: 12 mm, or never."""
     return NEVER if value is None or not value < _ABSURD * typical else sized(value, unit)
+
+
+def loud_and_noted(found: Iterable[Attention]) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Return where and what of the sentences that somebody must look at, and of the notes, without the headline."""
+    lines = [one for one in told_together(found) if one.about != ABOUT]
+    loud, noted = (
+        [(trial_and_subject(one), one.text) for one in lines if (one.level == "note") == note] for note in (False, True)
+    )
+    return loud, noted
+
+
+def headline_of(found: Iterable[Attention]) -> Attention | None:
+    """Return the sentence that says the verdict; None without one."""
+    return next((one for one in found if one.about == ABOUT), None)
 
 
 def trial_and_subject(one: Attention) -> str:

@@ -1,5 +1,6 @@
 """Write what was found into a folder: the page for the analyst and the numbers for programs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -161,21 +162,12 @@ def _accepted(
     """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
     write. Only what is proven to gain on data that were not used is taken off or believed.
     """
-    name, files = f"session {result.session.folder.name}", {}
-    undone = found.mended.checks if found.mended else ()
-    right = {(one.effect, one.target) for one in (*undone, *(c for c in found.diagnosis.checks if c.mended))}
-    findings = tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
-    written, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
-    body, proven = found.accepted, found.gain is not None and found.gain.proven
-    if body is not None and body.status == "solved" and proven:
-        named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
-        files[BODY_FILE] = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
-        written = (*written, Written(BODY_FILE, f"the body identified with {named} accepted"))
+    name, undone = f"session {result.session.folder.name}", found.mended.checks if found.mended else ()
+    findings, proven = _not_put_right(found, undone), _is_proven(found)
+    copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
-    if made and (text := lab_text(earlier, made)):
-        files[LAB] = text
-        lasting = "; ".join(str(one) for one in made if one.fault.lasting)
-        written = (*written, Written(LAB, f"to be taken off other sessions: {lasting or 'as before'}"))
+    files = _accepted_body(found, findings, name) | _lab_file(earlier, made)
+    written = (*copied, *(Written(file, what) for file, (_, what) in files.items()))
     rewritten = (*(one.text for one in undone if one.effect != LabelsSwapped.name), *map(str, made))
     trials, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
     left = _not_applied(findings, proven=proven)
@@ -189,7 +181,37 @@ def _accepted(
         "written": [one._asdict() for one in (*written, *_of_trials(trials, rewritten))],
         "not_applied": [{"cause": cause_name(names), "why": why} for names, why in left.items()],
     }
-    return document, files
+    return document, {file: text for file, (text, _) in files.items()}
+
+
+def _not_put_right(found: SessionDiagnosis, undone: Sequence[QualityCheck]) -> tuple[Finding, ...]:
+    """Return the faults that no check put right in a copy already."""
+    checks = (*undone, *(check for check in found.diagnosis.checks if check.mended))
+    right = {(check.effect, check.target) for check in checks}
+    return tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
+
+
+def _is_proven(found: SessionDiagnosis) -> bool:
+    return found.gain is not None and found.gain.proven
+
+
+def _accepted_body(found: SessionDiagnosis, findings: Sequence[Finding], name: str) -> dict[str, tuple[str, str]]:
+    """Return, by its file, the text of the body with the findings accepted and what it is; {} where not solved or
+    not proven to gain.
+    """
+    body = found.accepted
+    if body is None or body.status != "solved" or not _is_proven(found):
+        return {}
+    named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
+    text = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
+    return {BODY_FILE: (text, f"the body identified with {named} accepted")}
+
+
+def _lab_file(earlier: tuple[PlateCorrection, ...], made: tuple[PlateCorrection, ...]) -> dict[str, tuple[str, str]]:
+    """Return, by its file, the text of the corrections that last in this laboratory and what it is; {} without one."""
+    text = lab_text(earlier, made) if made else ""
+    lasting = "; ".join(str(one) for one in made if one.fault.lasting)
+    return {LAB: (text, f"to be taken off other sessions: {lasting or 'as before'}")} if text else {}
 
 
 def _of_trials(trials: tuple[str, ...], changes: tuple[str, ...]) -> list[Written]:

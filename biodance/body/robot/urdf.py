@@ -86,12 +86,10 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
 def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier], *, mend: bool) -> Body:
     """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
     segments = tuple(carrier.link for carrier in heavy)
-    lumps = [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
+    written = [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
-    boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, lumps, strict=True)])
-    broken = [i for i, lump in enumerate(lumps) if mend and lump.mass > 0 and not is_possible(lump)]
-    for i in broken:
-        lumps[i] = solid(lumps[i], boxes[i])
+    boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, written, strict=True)])
+    lumps = [_possible(lump, box) for lump, box in zip(written, boxes, strict=True)] if mend else written
     com = np.array([lump.com for lump in lumps])[:, None]
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
     body = Body(
@@ -107,7 +105,7 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
             file,
             guessed=[carrier.link for carrier in heavy if not carrier.corners.size],
             points=[segment for segment, lump in zip(segments, lumps, strict=True) if is_point(lump)],
-            mended=[segments[i] for i in broken],
+            mended=[segment for segment, old, new in zip(segments, written, lumps, strict=True) if new is not old],
         ),
     )
     try:
@@ -116,6 +114,11 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         raise FileRefused(f"{file.path}: {error} Or ask to mend it (--mend): a solid box in its place.") from error
     spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
     return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
+
+
+def _possible(lump: RigidInertia, box: Array) -> RigidInertia:
+    """Return the inertia, or that of a solid box in its place where no body of its mass can have it."""
+    return solid(lump, box) if lump.mass > 0 and not is_possible(lump) else lump
 
 
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:

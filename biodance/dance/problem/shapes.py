@@ -123,20 +123,27 @@ def tree_pairs(body: Body) -> Pairs:
     """Return the pairs of a robot's segments that must not touch: limbs more than `_NEAR` segments apart along the
     tree, and limbs that belong to no leg against boxes other than the one that carries them.
     """
-    carried = body.segment_joint[: len(body.segments)]
-    above = [body.place_on_segment(joint)[0] if joint >= 0 else -1 for joint in carried]
-    boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
-    legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
-    limbs = [i for i in range(len(above)) if i not in boxes]
-    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
-    walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
+    solid, walls = _distant_pairs(body)
     pose = poses(body, body.neutral[None])
-    shape = {i: capsule(body, i) for i in limbs}
+    shape = {i: capsule(body, i) for i in range(len(body.segments))}
     axes = {i: points_on_axis(pose, i, ends, _POINTS) for i, (ends, _) in shape.items()}
     free = [(i, j) for i, j in solid if points_apart(axes[i], axes[j])[0] - shape[i][1] - shape[j][1] > 0]
     clear = [(i, j) for i, j in walls if points_off_box(body, pose, axes[i], j)[0] - shape[i][1] > 0]
     left = [pair for pair in solid + walls if pair not in free and pair not in clear]
     return Pairs(free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left))
+
+
+def _distant_pairs(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return the pairs of two limbs, and of a limb and a box, that are no neighbours along the tree. A box is the root
+    or carries several segments; all others are limbs.
+    """
+    carried = body.segment_joint[: len(body.segments)]
+    above = [body.place_on_segment(joint)[0] if joint >= 0 else -1 for joint in carried]
+    boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
+    limbs = [i for i in range(len(above)) if i not in boxes]
+    legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
+    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
+    return solid, [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
 
 
 def _up(above: list[int], segment: int) -> list[int]:

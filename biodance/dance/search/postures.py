@@ -8,10 +8,11 @@ nothing helps and no two alike, for better ones among all that came by and their
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain as chained
 from typing import NoReturn
 
 import numpy as np
@@ -23,6 +24,7 @@ from biodance.dance.limits import CheckedMotion, Limit
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import (
     Blocks,
+    criteria,
     effort,
     smooth_condition,
     static_grams,
@@ -325,33 +327,20 @@ def find_postures(
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
-
-    def price(chosen: list[Posture]) -> float:
-        """Criterion and, where simplicity counts, how hard the postures are to take, kg."""
-        hard = float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
-        return criterion(blocks, chosen) + blocks.simplicity * hard
-
-    search, named = _Search(chain, blocks, stances, limits, seed), {stance.name: k for k, stance in enumerate(stances)}
-    checked = {name: workers.submit(search.possible, k) for name, k in named.items()}
-    possible = {name: task.result() for name, task in checked.items()}
-    tasks = [workers.submit(search.run, run) for run in range(RUNS)]
-    pool = [[p for part in parts for p in part] for parts in zip(*(task.result() for task in tasks), strict=True)]
-    kept = [
-        [p for p in found if p.violation <= KEPT] or [replace(possible[s.name])]
-        for s, found in zip(stances, pool, strict=True)
-    ]
-    kept = search.with_images(kept, kept)
+    search = _Search(chain, blocks, stances, limits, seed)
+    kept = search.independent_runs(workers)
     chosen = exchange(blocks, stances, kept)
     for n, (sharpness, iterations) in enumerate((*FRESH, *POLISH)):
         begin = [search.anywhere(k, 100 + n) for k in range(len(stances))] if n < len(FRESH) else [p.x for p in chosen]
-        halves = [list(range(k, len(stances), 2)) for k in range(2)]
-        parts = [workers.submit(search.sweep, chosen, begin, half, sharpness, iterations) for half in halves]
-        better = [part.result() for part in parts]
-        found = [better[k % 2][k // 2] for k in range(len(stances))]
+        found = list(chosen)
+        halves = [range(k, len(stances), 2) for k in range(2)]
+        tasks = [workers.submit(search.sweep, chosen, begin, half, sharpness, iterations) for half in halves]
+        for half, task in enumerate(tasks):
+            found[half::2] = task.result()
         kept = [[new, *rest] if new.violation <= KEPT else rest for new, rest in zip(found, kept, strict=True)]
         kept = search.with_images(kept, [[new] for new in found])
         before = [[old, *(p for p in rest if p is not old)] for old, rest in zip(chosen, kept, strict=True)]
-        chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=price)
+        chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=search.price)
     return np.array([p.x for p in chosen])
 
 
@@ -368,6 +357,23 @@ class _Search:
     def anywhere(self, place: int, run: int) -> Array:
         """Return the start (n,) of one posture in one run."""
         return initial_guess(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
+
+    def price(self, chosen: list[Posture]) -> float:
+        """Return the criterion and, where simplicity counts, how hard the postures are to take, kg."""
+        hard = float(self.blocks.weight.sum() * np.mean([p.hard for p in chosen]))
+        return criterion(self.blocks, chosen) + self.blocks.simplicity * hard
+
+    def independent_runs(self, workers: Executor) -> list[list[Posture]]:
+        """Return for every place the postures of `RUNS` searches that keep all limits; refuse a place without any."""
+        named = {stance.name: k for k, stance in enumerate(self.stances)}
+        checked = {name: workers.submit(self.possible, k) for name, k in named.items()}
+        possible = {name: task.result() for name, task in checked.items()}
+        tasks = [workers.submit(self.run, run) for run in range(RUNS)]
+        kept = []
+        for stance, *found in zip(self.stances, *(task.result() for task in tasks), strict=True):
+            within = [p for p in chained.from_iterable(found) if p.violation <= KEPT]
+            kept.append(within or [replace(possible[stance.name])])
+        return self.with_images(kept, kept)
 
     def possible(self, place: int) -> Posture:
         """Return a posture that keeps all limits at this place, or raise the BiodanceError that names a limit."""
@@ -402,7 +408,7 @@ class _Search:
         return out
 
     def sweep(
-        self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int
+        self, now: list[Posture], begin: list[Array], order: Sequence[int], sharpness: int, iterations: int
     ) -> list[Posture]:
         """Return the postures of the places ``order``, found in turn from ``begin``, the others held, by place."""
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
@@ -418,39 +424,56 @@ class _Search:
         return [now[p] for p in sorted(order)]
 
 
+@dataclass(frozen=True, eq=False)
+class _SameFeet:
+    """All ``postures`` (K) on the same feet, their Gram matrices ``grams`` (K, N, 3, 3), which are ``like`` which
+    (K, K), how ``hard`` (K,) they are to take, kg; ``taken`` indices of those chosen, by place.
+    """
+
+    postures: list[Posture]
+    grams: Array
+    like: NDArray[np.bool_]
+    hard: Array
+    taken: list[int]
+
+    @classmethod
+    def first_of(cls, pool: list[list[Posture]], worth: float) -> "_SameFeet":
+        """Return the postures of these places, the first of each place taken unless it is like one taken before."""
+        every = list(dict.fromkeys(chained.from_iterable(pool)))
+        grams = np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in every])] * 2)
+        like, taken = alike(np.array([p.x for p in every])), list[int]()
+        for found in pool:
+            order = [every.index(found[0]), *range(len(every))]
+            taken.append(next((i for i in order if not like[i, taken].any()), order[0]))
+        return cls(every, grams, like, worth * np.array([p.hard for p in every]), taken)
+
+    def spare(self, place: int) -> NDArray[np.intp]:
+        """Return the indices of the postures that may stand at a place: like none of the others taken."""
+        return np.flatnonzero(~self.like[:, self.taken[:place] + self.taken[place + 1 :]].any(axis=1))
+
+
 def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
     """Return one posture for each place, no two of a stance alike (`APART`) where the pool allows: those that come
     first, exchanged for better ones of the same stance as long as any helps.
     """
-    kinds = [stance.name for stance in stances]
-    every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
-    for kind, found in zip(kinds, pool, strict=True):
-        every[kind] += [posture for posture in found if posture not in every[kind]]
-    grams = {
-        kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2)
-        for kind, found in every.items()
-    }
-    like = {kind: alike(np.array([p.x for p in found])) for kind, found in every.items()}
-    taken: dict[str, list[int]] = {kind: [] for kind in every}
-    for kind, found in zip(kinds, pool, strict=True):
-        order = [every[kind].index(found[0]), *range(len(every[kind]))]
-        taken[kind].append(next((i for i in order if not like[kind][i, taken[kind]].any()), order[0]))
     worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
-    hard = {kind: worth * np.array([p.hard for p in found]) for kind, found in every.items()}
-    whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
-    effort = sum(hard[kind][picks].sum() for kind, picks in taken.items())
-    value = _values(blocks, whole[None])[0] + effort
-    for kind, place in _places(taken):
-        now, rest = taken[kind][place], taken[kind][:place] + taken[kind][place + 1 :]
-        spare = np.flatnonzero(~like[kind][:, rest].any(axis=1))
+    of_feet: dict[str, list[list[Posture]]] = {}
+    for stance, found in zip(stances, pool, strict=True):
+        of_feet.setdefault(stance.name, []).append(found)
+    feet = {name: _SameFeet.first_of(found, worth) for name, found in of_feet.items()}
+    whole = sum(one.grams[one.taken].sum(axis=0) for one in feet.values())
+    effort = sum(one.hard[one.taken].sum() for one in feet.values())
+    value = criteria(blocks, whole[None])[0] + effort
+    for one, place in _places(list(feet.values())):
+        now, spare = one.taken[place], one.spare(place)
         if spare.size:
-            trial, efforts = whole - grams[kind][now] + grams[kind][spare], effort - hard[kind][now] + hard[kind][spare]
-            values = _values(blocks, trial) + efforts
+            trial, efforts = whole - one.grams[now] + one.grams[spare], effort - one.hard[now] + one.hard[spare]
+            values = criteria(blocks, trial) + efforts
             if values.min() < value - 1e-6:
                 value, best = values.min(), int(values.argmin())
-                whole, effort, taken[kind][place] = trial[best], efforts[best], int(spare[best])
-    picks = {kind: iter(chosen) for kind, chosen in taken.items()}
-    return [every[kind][next(picks[kind])] for kind in kinds]
+                whole, effort, one.taken[place] = trial[best], efforts[best], int(spare[best])
+    picks = {name: iter(one.taken) for name, one in feet.items()}
+    return [feet[stance.name].postures[next(picks[stance.name])] for stance in stances]
 
 
 def alike(x: Array) -> NDArray[np.bool_]:
@@ -458,41 +481,14 @@ def alike(x: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(x[:, None] - x[None]).max(axis=2) < APART)
 
 
-def _places(taken: dict[str, list[int]]) -> Iterator[tuple[str, int]]:
+def _places(feet: list[_SameFeet]) -> Iterator[tuple[_SameFeet, int]]:
     """Yield all places in turn, again and again, until a round has changed nothing."""
-    before: dict[str, list[int]] = {}
-    while before != taken:
-        before = {kind: list(picks) for kind, picks in taken.items()}
-        for kind, picks in taken.items():
-            for place in range(len(picks)):
-                yield kind, place
-
-
-def _values(blocks: Blocks, grams: Array) -> Array:
-    """Return the criterion (K,) kg of K sets of Gram matrices (K, N, 3, 3)."""
-    out = np.zeros(len(grams))
-    whole = [i for i, pick in enumerate(blocks.first) if len(pick) == 3 and blocks.weight[i] > 0]
-    if whole:
-        least, most = extremes(grams[:, whole])
-        out += np.sqrt(most / np.maximum(least, 1e-12)) @ blocks.weight[whole]
-    for i, pick in enumerate(blocks.first):
-        if 0 < len(pick) < 3 and blocks.weight[i] > 0:
-            value = np.linalg.eigvalsh(grams[:, i][np.ix_(range(len(grams)), pick, pick)])
-            out += blocks.weight[i] * np.sqrt(value[:, -1] / np.maximum(value[:, 0], 1e-12))
-    return out
-
-
-def extremes(A: Array) -> tuple[Array, Array]:
-    """Return the smallest and the largest eigenvalue of symmetric matrices (..., 3, 3) in closed form
-    (doi:10.1145/355578.366316): an exchange asks for a million of them.
-    """
-    mean = (A[..., 0, 0] + A[..., 1, 1] + A[..., 2, 2]) / 3
-    a, b, c = (A[..., i, i] - mean for i in range(3))
-    d, e, f = A[..., 0, 1], A[..., 1, 2], A[..., 0, 2]
-    radius = np.sqrt((a * a + b * b + c * c + 2 * (d * d + e * e + f * f)) / 6)
-    half = (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)) / 2
-    angle = np.arccos(np.clip(half / np.maximum(radius**3, 1e-300), -1.0, 1.0)) / 3
-    return mean + 2 * radius * np.cos(angle + 2 * np.pi / 3), mean + 2 * radius * np.cos(angle)
+    before: list[list[int]] = []
+    while before != (now := [list(one.taken) for one in feet]):
+        before = now
+        for one in feet:
+            for place in range(len(one.taken)):
+                yield one, place
 
 
 def criterion(blocks: Blocks, chosen: list[Posture]) -> float:

@@ -181,8 +181,8 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
         return [(0, 0)]
     if values == 0 and samples == 0:  # a header that is silent on analog data
         return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
-    channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
-    rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
+    channels = _distinct([used, *_whole_quotients(values, (samples, ratio))])
+    rows = _distinct([samples, ratio, *_whole_quotients(values, channels)])
 
     def against(c: int, s: int) -> int:
         contradicted = (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio))
@@ -192,6 +192,10 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     least = min(votes.values(), default=0)
     none = [(0, 0)] if used == 0 or values == 0 else []  # one statement says that there are no analog data
     return none + [pair for pair, count in votes.items() if count == least and count <= 1]
+
+
+def _whole_quotients(total: float, divisors: Iterable[float]) -> list[float]:
+    return [total / divisor for divisor in divisors if divisor > 0 and total % divisor == 0]
 
 
 def _counts(
@@ -204,9 +208,7 @@ def _counts(
     remarks: list[str],
 ) -> tuple[int, int, int, int, int]:
     """Return (start byte, points, channels, samples per frame, frames); say in ``notes`` what was overruled."""
-    starts = _distinct(
-        [header.data_start, (_scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
-    )
+    starts = _distinct([header.data_start, C3D_BLOCK * ((_scalar(parameters, "POINT", "DATA_START") or math.nan) - 1)])
     points = _distinct([header.points, _scalar(parameters, "POINT", "USED")])
     analog, frames, size = _analog_counts(header, parameters), _frame_counts(header, parameters), len(content)
     clipped = _CLIPPED in (header.last_frame, _unsigned(_scalar(parameters, "POINT", "FRAMES")))

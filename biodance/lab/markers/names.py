@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from itertools import permutations, product
+from itertools import islice, permutations, product
 from typing import TypeVar
 
 from biodance.lab.markers.sets import LANDMARKS
@@ -183,6 +183,8 @@ def _mirrored(every: Mapping[str, Iterable[_Spelled]]) -> dict[tuple[str, str, s
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
 _WHOLE = {"head_front", "head_back"}
 """Landmarks of the midline that are the mean of a right and a left marker."""
+_UNPAIRED = ("pelvis", "trunk_head")
+"""Segments that have no side."""
 _JOINTS = ("hip", "knee", "ankle")
 """Joints whose bare names stand on both sides in every skeleton of video: HALPE, COCO, OpenPose, BlazePose."""
 _SKIN = ("asis", "psis", "knee_medial", "ankle_medial")
@@ -299,28 +301,44 @@ def _places(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
 
 
 def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
+    """Return places and ranks: landmarks spelled whole, then segments; with a side, also a segment that one token
+    names, and landmarks composed of a region and a quality.
+    """
     words = _vocabulary()
     joined = ["".join(order) for order in permutations(rest)] if len(rest) <= 3 else ["".join(rest)]
-    found = []
-    for spelling in joined:
-        for landmark, rank in words.landmarks.get(spelling, ()):
-            if landmark in _WHOLE or (landmark in _MIDLINE and not side):
-                found.append((landmark, rank))
-            elif landmark not in _MIDLINE and side:
-                found.append((f"{side}_{landmark}", rank))
-    named = bool(found)
-    for spelling in joined:
-        stem = spelling.rstrip("0123456789")
-        sided = words.segments.get(stem if side else spelling) or words.segments.get(spelling if side else stem)
-        middle = sided in ("pelvis", "trunk_head")
-        if sided and (side or (middle and len(spelling) > 1)):
-            found.append((sided if middle else f"{side}_{sided}", 500))
-    part = next((words.segments[token] for token in rest if len(token) > 2 and token in words.segments), "")
-    if part and side and not found:
-        found.append((part if part in ("pelvis", "trunk_head") else f"{side}_{part}", 600))
-    if side and not named:
+    spelled = [one for spelling in joined for one in words.landmarks.get(spelling, ())]
+    landmarks = [(place, rank) for landmark, rank in spelled if (place := _landmark_on(side, landmark))]
+    found = landmarks + [(place, 500) for spelling in joined if (place := _segment_spelled(spelling, side))]
+    if side and not found:
+        parts = (words.segments[token] for token in rest if len(token) > 2 and token in words.segments)
+        found = [(_segment_on(side, part), 600) for part in islice(parts, 1)]
+    if side and not landmarks:
         found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(rest)]
     return found
+
+
+def _landmark_on(side: str, landmark: str) -> str:
+    """Return a landmark with its ``side``; "" where it lies on the midline but has one, or lacks the one it needs."""
+    if landmark in _WHOLE:
+        return landmark
+    if landmark in _MIDLINE:
+        return "" if side else landmark
+    return f"{side}_{landmark}" if side else ""
+
+
+def _segment_on(side: str, segment: str) -> str:
+    return segment if segment in _UNPAIRED else f"{side}_{segment}"
+
+
+def _segment_spelled(spelling: str, side: str) -> str:
+    """Return the segment that a spelling names, with or without the number behind it; "" if none, or if its side is
+    not known.
+    """
+    segments, stem = _vocabulary().segments, spelling.rstrip("0123456789")
+    first, second = (stem, spelling) if side else (spelling, stem)
+    segment = segments.get(first) or segments.get(second) or ""
+    known = side or (segment in _UNPAIRED and len(spelling) > 1)
+    return _segment_on(side, segment) if segment and known else ""
 
 
 def _composed(rest: tuple[str, ...]) -> list[tuple[str, int]]:

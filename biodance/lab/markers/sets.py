@@ -4,7 +4,7 @@ simply not there.
 """
 
 import json
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -227,28 +227,43 @@ def _marker(path: Path, label: str, fields: Any) -> _SetMarker:
     unknown = [key for key in fields if key not in _MARKER_KEYS]
     if unknown:
         raise BiodanceError(f"{where} has the unknown key {unknown[0]!r}. Legal: {', '.join(_MARKER_KEYS)}.")
-    weight = fields.get("weight", 1.0)
-    if not _number(weight) or weight < 0:
-        raise BiodanceError(f"{where} has the weight {weight!r}, expected a number >= 0.")
+    for key, (legal_value, expected) in _MARKER_VALUES.items():
+        if key in fields and not legal_value(fields[key]):
+            raise BiodanceError(f"{where} has the {key} {fields[key]!r}, expected {expected}.")
     if ("offset" in fields) != ("normaliser" in fields):
         raise BiodanceError(
             f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither."
         )
-    corner_of = fields.get("corner_of", [])
-    if corner_of and not (isinstance(corner_of, list) and len(corner_of) == 3):
-        raise BiodanceError(f"{where} has corner_of {corner_of!r}, expected the three labels of an alignment device.")
-    offset = fields.get("offset")
-    if offset is not None and not (isinstance(offset, list) and len(offset) == 3 and all(_number(x) for x in offset)):
-        raise BiodanceError(
-            f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right)."
-        )
-    place = None if offset is None else tuple(float(x) for x in offset)
-    said = {"offset": place, "corner_of": tuple(map(str, corner_of)), "weight": float(weight)}
+    said = {
+        "offset": tuple(map(float, fields["offset"])) if "offset" in fields else None,
+        "corner_of": tuple(map(str, fields.get("corner_of", ()))),
+        "weight": float(fields.get("weight", 1.0)),
+    }
     return _SetMarker(label, **{**fields, **said})
 
 
 def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
+
+
+def _is_weight(value: Any) -> bool:
+    return _number(value) and value >= 0
+
+
+def _three(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 3
+
+
+def _is_offset(value: Any) -> bool:
+    return _three(value) and all(map(_number, value))
+
+
+_MARKER_VALUES: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "weight": (_is_weight, "a number >= 0"),
+    "corner_of": (_three, "the three labels of an alignment device"),
+    "offset": (_is_offset, "three numbers [x, y, z] (anterior, up, right)"),
+}
+"""What the entries of a marker that are no words must be, and how that is said."""
 
 
 FOLDER = "anthropometry/marker_sets"

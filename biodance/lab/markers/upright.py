@@ -237,8 +237,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     ``at`` label -> (3,) m, z up; ``named`` landmark -> label.
     """
     known = {place: at[label] for place, label in named.items()}
-    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
-    pairs = {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+    pairs = _from_left_to_right(known)
     ends = [(f"{side}_{front}", back.format(side)) for side in SIDES for front, back in _FRONT_AND_BACK]
     ahead = [known[front] - known[back] for front, back in ends if known.keys() >= {front, back}]
     if len(pairs) < 3 or not ahead:
@@ -254,19 +253,36 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
         )
     if any(pair @ right <= 0 for pair in pairs.values()):
         return "Of some pairs of markers the right one lies left of the left one: the sides are exchanged in part."
-    both = [part for part in _STRAIGHT[:2] if part in pairs] or list(pairs)
-    middle = np.mean([known[f"{side}_{part}"] for part in both for side in SIDES], axis=0)
     feet = [place[2] for name, place in known.items() if name.endswith(_FEET)]
     floor = float(min(feet or (at[label][2] for label in plain_labels(at)))) - 0.02
-    usual = [(place[2], _height_of(name)) for name, place in known.items()]
-    statures = [(high - floor) / pair[0] for high, pair in usual if pair and pair[0] > 0.2]
-    stature = float(np.median(statures)) if statures else 0.0
+    stature = _stature(known, floor)
     if not 0.6 < stature < 2.6:
         return f"Nobody stands upright here: the labels would make a person of {stature:.2f} m."
+    return Standing(at, named, right, forward, _middle(known, pairs, forward, stature), floor, stature)
+
+
+def _from_left_to_right(known: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the vectors (3,) m from the left to the right landmark of each pair of which both are known."""
+    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
+    return {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+
+
+def _stature(known: Mapping[str, Array], floor: float) -> float:
+    """Return the stature, m, that the usual heights of landmarks above the ankle tell (median); 0 without one."""
+    usual = [(place[2], _height_of(name)) for name, place in known.items()]
+    statures = [(high - floor) / pair[0] for high, pair in usual if pair and pair[0] > 0.2]
+    return float(np.median(statures)) if statures else 0.0
+
+
+def _middle(known: Mapping[str, Array], pairs: Iterable[str], forward: Array, stature: float) -> Array:
+    """Return the middle (3,) m of the body between its iliac spines, moved ``forward`` until it is above the ankles."""
+    parts = list(pairs)
+    both = [part for part in _STRAIGHT[:2] if part in parts] or parts
+    middle = np.mean([known[f"{side}_{part}"] for part in both for side in SIDES], axis=0)
     ankles, spines = ([known[place] for s in SIDES if (place := f"{s}_{part}") in known] for part in _ABOVE)
-    usual_place = usual_standing()["places"]["asis"]["at"][1] * stature
-    back = np.mean(ankles, axis=0) if len(ankles) == 2 else np.mean(spines or [middle], axis=0) - usual_place * forward
-    return Standing(at, named, right, forward, middle + (back - middle) @ forward * forward, floor, stature)
+    ahead_of_ankles = usual_standing()["places"]["asis"]["at"][1] * stature * forward
+    above = np.mean(ankles, axis=0) if len(ankles) == 2 else np.mean(spines or [middle], axis=0) - ahead_of_ankles
+    return np.asarray(middle + (above - middle) @ forward * forward)
 
 
 def standing_by_points(at: Mapping[str, Array]) -> Standing | None:

@@ -117,17 +117,12 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     more = {int(name.removeprefix("plate")): one for name, one in told.items()}
     if not count and not warnings and not more:
         warnings = _undescribed_plates(raw)
-    lacking = [n for n, one in more.items() if n > count and one.use and not one.channels] if raw.analog.size else []
-    warnings += tuple(
-        f"Plate {n} of session.toml is none of the file's {count} plates. Give its channels in [plates.plate{n}], or "
-        f"take it away."
-        for n in lacking
-    )
+    if raw.analog.size:
+        warnings += _without_channels(more, count)
     unused = [n for n, one in more.items() if not one.use]
     numbers = sorted({*range(1, count + 1), *(n for n, one in more.items() if one.channels)} - set(unused))
     history = tuple(f"plate{n} was left out, as session.toml says." for n in unused if n <= count)
-    if numbers and (raw.analog.shape[0] == 0 or not raw.analog_rate > 0):
-        lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
+    if numbers and (lacks := _lack_of_samples(raw)):
         declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
         return _DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
     plates, refused = [], {}
@@ -137,6 +132,23 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
         except TrialRefused as error:
             refused[number] = str(error)
     return _DeclaredPlates(tuple(plates), refused, warnings, history)
+
+
+def _lack_of_samples(raw: RawC3d) -> str:
+    """Say why the analog data hold no samples of a plate; "" where they do."""
+    if raw.analog.shape[0] == 0:
+        return "holds no analog samples"
+    return "" if raw.analog_rate > 0 else f"has the analog rate {raw.analog_rate:g}"
+
+
+def _without_channels(told: Mapping[int, ToldPlate], count: int) -> tuple[str, ...]:
+    """Return a sentence for every plate of session.toml beyond the file's ``count`` that is to be used without one."""
+    return tuple(
+        f"Plate {n} of session.toml is none of the file's {count} plates. Give its channels in [plates.plate{n}], or "
+        f"take it away."
+        for n, one in told.items()
+        if n > count and one.use and not one.channels
+    )
 
 
 def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:

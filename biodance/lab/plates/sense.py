@@ -311,19 +311,13 @@ def _in_lab(
     reading, moved = _with_origin_under_feet(reading, time, markers)
     wrench, said = _surface_wrench(reading)
     sway = sway_sign(wrench[:, :3], pressure_point(reading), reading.rate) if alone and sign else 0
-    seen, doubt, fz_alone = "", "", False
     if sway and sway != sign and reading.axes[2, 2] > 0:
         reading, seen = _unmirrored(reading, time, markers)
         wrench, said = _surface_wrench(reading)
         sign, doubt = sway, seen
-    elif sway == sign and sway:
-        seen = "The sway of the standing person confirms the sign of the shear."
-    elif sway:
-        contrary = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
-        seen, doubt = f"{contrary}.", f"{contrary}. Check the cabling and the corner order."
-    elif sign and reading.axes[2, 2] > 0:
-        seen, doubt = _upwards_said(reading.plate.type)
-    doubts, checked = [*moved, *[doubt] * bool(doubt)], ""
+    else:
+        seen, doubt = _direction_said(reading, sign, sway)
+    doubts, checked, fz_alone = [*moved, *[doubt] * bool(doubt)], "", False
     if markers is not None and sign:
         reading, angle, checked, doubt = _under_feet(reading, time, markers)
         fz_alone = odd and angle == 180
@@ -344,6 +338,16 @@ def _in_lab(
         for some in ((*steps.corners, *steps.origin, *steps.gaps), doubts)
     )
     return _Sensed(done, (*odd_said, *reading.warnings, *more), fz_alone)
+
+
+def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, str]:
+    """Say what the sway of a standing person (0 = not known) tells of a plate that was not mirrored, and doubt it."""
+    if sway and sway == sign:
+        return "The sway of the standing person confirms the sign of the shear.", ""
+    if sway:
+        contrary = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
+        return f"{contrary}.", f"{contrary}. Check the cabling and the corner order."
+    return _upwards_said(reading.plate.type) if sign and reading.axes[2, 2] > 0 else ("", "")
 
 
 def _upwards_said(kind: int) -> tuple[str, str]:

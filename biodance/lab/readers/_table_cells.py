@@ -4,8 +4,9 @@ decimal points or commas, or from Parquet.
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -196,19 +197,24 @@ class TableColumns:
 
 def columns_in(labels: Sequence[str]) -> TableColumns:
     """Return what the columns with these ``labels`` hold."""
-    times = [(k, match) for k, label in enumerate(labels) if (match := _TIME.fullmatch(label))]
-    time = times[0][0] if times else None
+    times = ((k, match[1] or "") for k, label in enumerate(labels) if (match := _TIME.fullmatch(label)))
+    time, unit = next(times, (None, ""))
     forces = [_as_channel(label) for label in labels]
     plates = tuple(group for group in channel_groups(forces) if len(group) == 6)
-    taken = {*(k for group in plates for k in group), *([time] if time is not None else [])}
+    taken = {time, *chain(*plates)}
     free = [k for k in range(len(labels)) if k not in taken]
     behind, before = (_triples(labels, free, pattern, axis) for pattern, axis in ((_BEHIND, 2), (_BEFORE, 1)))
-    found, length = max((behind, before), key=lambda some: sum(len(axes) == 3 for axes in some[0].values()))
-    markers = {name: (axes["x"], axes["y"], axes["z"]) for name, axes in found.items() if len(axes) == 3}
+    found, length = max((behind, before), key=lambda notation: len(_with_all_axes(notation[0])))
+    markers = _with_all_axes(found)
     broken = tuple(name for name, axes in found.items() if len(axes) == 2)
-    used = taken | {k for some in markers.values() for k in some}
-    others = tuple(labels[k] for k in range(len(labels)) if k not in used and labels[k])
-    return TableColumns(time, (times[0][1][1] or "") if times else "", markers, length, plates, others, broken)
+    used = taken.union(*markers.values())
+    others = tuple(label for k, label in enumerate(labels) if k not in used and label)
+    return TableColumns(time, unit, markers, length, plates, others, broken)
+
+
+def _with_all_axes(found: Mapping[str, Mapping[str, int]]) -> dict[str, tuple[int, int, int]]:
+    """Return the columns of x, y, z of the markers of which none is missing."""
+    return {name: (axes["x"], axes["y"], axes["z"]) for name, axes in found.items() if len(axes) == 3}
 
 
 def _as_channel(label: str) -> str:

@@ -5,7 +5,7 @@ twice, and those of another person.
 import filecmp
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 
@@ -96,18 +96,14 @@ def _in_parts(folder: Path, own: list[Path], readers: Chosen[Reader]) -> tuple[l
     parts, notes = {}, []
     for part in sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")):
         found = recordings_below(part, readers)
-        if found and any((part / name).is_file() for name in RESULTS):
+        if found and _holds_any(part, RESULTS):
             notes.append(f"The folder {part.name} was left aside: it holds results of biodance.")
         elif found:
             parts[part] = found
     several = len(parts) > 1
     trials = set(_without_companions([*own, *(file for found in parts.values() for file in found)], readers))
     parts = {part: own_trials for part, found in parts.items() if (own_trials := [f for f in found if f in trials])}
-    whole = [part for part, found in parts.items() if _is_whole(part, found)]
-    alone = len(whole) + any(role_by_name(file.stem) == "static" for file in own) < 2
-    if alone and (own or several):
-        whole = [part for part in whole if any((part / name).is_file() for name in _OWN_FILES)]
-    for part in whole:
+    for part in _sessions_of_their_own(parts, own, beside=bool(own) or several):
         count = len(parts.pop(part))
         notes.append(
             f"The folder {part.name} ({count} recordings) was left aside: it is a session of its own. Point at it to "
@@ -116,9 +112,22 @@ def _in_parts(folder: Path, own: list[Path], readers: Chosen[Reader]) -> tuple[l
     return [file for found in parts.values() for file in found], notes
 
 
+def _sessions_of_their_own(parts: Mapping[Path, list[Path]], own: list[Path], *, beside: bool) -> list[Path]:
+    """Return the parts that are sessions of their own: those that say so; the others only if there are static trials in
+    more than one place, or nothing is ``beside`` them.
+    """
+    whole = [part for part, found in parts.items() if _is_whole(part, found)]
+    places = len(whole) + any(role_by_name(file.stem) == "static" for file in own)
+    return [part for part in whole if _holds_any(part, _OWN_FILES)] if places < 2 and beside else whole
+
+
+def _holds_any(folder: Path, names: Iterable[str]) -> bool:
+    return any((folder / name).is_file() for name in names)
+
+
 def _is_whole(part: Path, files: list[Path]) -> bool:
     """Return whether a folder is a session of its own: it says so, or holds a static trial and others."""
-    if any((part / name).is_file() for name in _OWN_FILES):
+    if _holds_any(part, _OWN_FILES):
         return True
     roles = [role_by_name(file.stem) or role_by_name(file.parent.name) for file in files]
     return "static" in roles and any(role != "static" for role in roles)

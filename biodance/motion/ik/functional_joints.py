@@ -195,32 +195,17 @@ def _told(
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
-    placed_errors = []
-    for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
+
+    def error(joint: str) -> JointError:
         marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
-        placed_errors.append(
-            JointError(
-                joint,
-                _centre_sd(joint, deviation),
-                axis.get(joint, 0.0),
-                joint in wrong,
-                far,
-                marker,
-                *(_reach(joint, found.theta, covariance) if joint in wrong else (0.0, 0.0)),
-            )
-        )
-    errors = tuple(placed_errors)
+        reach = _reach(joint, found.theta, covariance) if joint in wrong else (0.0, 0.0)
+        centre = _centre_sd(joint, deviation)
+        return JointError(joint, centre, axis.get(joint, 0.0), joint in wrong, far, marker, *reach)
+
+    errors = tuple(error(joint) for joint in JOINTS if joint in moved or joint in spared)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
-    notes = []
-    if moved:
-        turns = {hinge: f" and {abs(np.degrees(angle)):.0f} deg" for hinge, angle in turned.items()}
-        each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
-        fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
-        notes.append(f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}.")
-    unseen = [joint for joint in kept if joint not in refused]
-    if unseen:
-        names = ", ".join(joint.replace("_", " ") for joint in unseen)
-        notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
+    notes = _placed_notes(moved, turned, start, found)
+    notes += _unseen_notes([joint for joint in kept if joint not in refused])
     notes += [_outside(joint, far) for joint, far in refused.items()]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
@@ -228,6 +213,22 @@ def _told(
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return _FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+
+
+def _placed_notes(
+    moved: Mapping[str, float], turned: Mapping[str, float], start: CalibrationState, found: CalibrationState
+) -> list[str]:
+    """Say how far the joints that the movement shows were ``moved`` (m) and ``turned`` (rad), if any."""
+    turns = {hinge: f" and {abs(np.degrees(angle)):.0f} deg" for hinge, angle in turned.items()}
+    each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
+    fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
+    return [f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}."] if each else []
+
+
+def _unseen_notes(joints: Sequence[str]) -> list[str]:
+    """Say which joints the movement does not show, if any."""
+    names = ", ".join(joint.replace("_", " ") for joint in joints)
+    return [f"Joints that the movement does not show, kept where the static trial puts them: {names}."] if names else []
 
 
 def _outside(joint: str, far: float) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.consequence import LIMIT, Adequacy, Unobservable
-from biodance.diagnosis.diagnosis import ABOUT, Estimate, Finding
+from biodance.diagnosis.diagnosis import Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
@@ -17,7 +17,6 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance, now
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNEL_TITLES, CHANNELS
-from biodance.records.attention import told_together
 from biodance.report.figures.vector import (
     LEFT_SIDE,
     RIGHT_SIDE,
@@ -40,11 +39,12 @@ from biodance.report.wording import (
     causes_by_effect,
     first_upper,
     format_number,
+    headline_of,
+    loud_and_noted,
     moment,
     share_of,
     size_seen,
     sized,
-    trial_and_subject,
 )
 from biodance.version import __version__
 
@@ -200,17 +200,12 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
-    others = [said for said in told_together(one.attention) if said.about != ABOUT]
+    others, noted = loud_and_noted(one.attention)
     witnesses = _witnesses(one.witnesses)
     witnessed = {(row["effect"], row["target"]) for row in witnesses["seen"]} if witnesses else set()
     blind = LIMIT_ROW.rows(row for row in one.unobservable if (row.effect, row.target) not in witnessed)
     never = [row for row in blind if size_seen(row["limit"], row["typical"], row["unit"]) == NEVER]
-    masses, made = list[Row](), f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
-    if found.before and found.accepted:
-        then, now = (
-            dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
-        )
-        masses = [{"segment": name, "before": then.get(name), "after": mass} for name, mass in now.items()]
+    made = f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     return render(
         "diagnosis.html.j2",
         filters={
@@ -231,19 +226,29 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         ending=_ENDINGS[one.status],
-        headline=next((said for said in one.attention if said.about == ABOUT), None),
-        others=[(trial_and_subject(said), said.text) for said in others if said.level != "note"],
-        noted=[(trial_and_subject(said), said.text) for said in others if said.level == "note"],
+        headline=headline_of(one.attention),
+        others=others,
+        noted=noted,
         failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=CHANNEL_TITLES,
-        masses=masses,
+        masses=_masses(found),
         left=Markup(left_figure(found.left)) if found.left else "",
         adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",
         limits=Markup(limits_figure(one.limits)) if one.limits else "",
         gain=found.gain,
         witnesses=witnesses,
     )
+
+
+def _masses(found: SessionDiagnosis) -> list[Row]:
+    """Return each segment's mass before and after the findings are accepted; none without both."""
+    if not (found.before and found.accepted):
+        return []
+    then, accepted = (
+        dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
+    )
+    return [{"segment": name, "before": then.get(name), "after": mass} for name, mass in accepted.items()]
 
 
 def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import ABOUT
 from biodance.identification.validation import TrialValidation
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
@@ -21,7 +20,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS, AngleState
-from biodance.records.attention import Attention, told_together
+from biodance.records.attention import Attention
 from biodance.report.figures.session import (
     FORCE_SCALE,
     RESIDUAL_SCALE,
@@ -36,7 +35,7 @@ from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import packed_numbers, print_sheet, render, script_json, template_text, three_js
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import GAP_ROW
-from biodance.report.wording import format_number, millimetres, moment, trial_and_subject
+from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres, moment
 
 
 def replay_data(found: SessionReplay) -> str:
@@ -241,7 +240,7 @@ def page(
     from markupsafe import Markup
 
     said = session_attention(result) if attention is None else attention
-    lines = [one for one in told_together(said) if one.about != ABOUT]
+    loud, noted = loud_and_noted(said)
     found = result.identification
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
     identified = identification_section(found) if found else ""
@@ -256,9 +255,9 @@ def page(
         replay=Markup(replay_data(replay)) if replay else "",
         loaded=bool(replay and replay.load),
         sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
-        headline=next((one for one in said if one.about == ABOUT), None),
-        attention=[(trial_and_subject(one), one.text) for one in lines if one.level != "note"],
-        noted=[(trial_and_subject(one), one.text) for one in lines if one.level == "note"],
+        headline=headline_of(said),
+        attention=loud,
+        noted=noted,
         tiles=key_figures(result),
         contents=_contents(f"{movement}{identified}{diagnosis}", replayed=replay is not None),
         check_table=check_table(result),

@@ -409,6 +409,18 @@ def _centred_squares(chain, xyz, weight):
 
 
 @compiled
+def _turn_stopped_by_angles(stopped, better, cardan):
+    """Let the ball joints that a limit stopped turn by their angles (``cardan``) until a better step is free of it;
+    return whether one was stopped that turned freely.
+    """
+    first = False
+    for b in range(stopped.shape[0]):
+        first = first or (stopped[b] and not cardan[b])
+        cardan[b] = stopped[b] or (cardan[b] and not better)
+    return first
+
+
+@compiled
 def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
     """Move the postures ``found.q`` (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in
     ``frames`` (B,), in at most ``steps``, and fill the rest of ``found``: ``cost`` (B,) m², ``slope`` (B,) m, ``steps``
@@ -456,10 +468,7 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
             better = convex and (
                 lowered <= cost[f] or lowered <= cost[f] + _ROUNDING * _centred_squares(chain, seen, w)
             )
-            retreat = False
-            for b in range(groups):
-                retreat = retreat or (stopped[b] and not cardan[b])
-                cardan[b] = stopped[b] or (cardan[b] and not better)
+            retreat = _turn_stopped_by_angles(stopped, better, cardan)
             if better:
                 damping = 0.1 * damping if damping > 1e-4 else 0.0
                 cost[f] = lowered
