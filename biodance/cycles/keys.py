@@ -9,6 +9,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride
+from biodance.lab.plates.faults import GAIN
 from biodance.records import SIDES, Array
 
 ANGLE_PANELS = (
@@ -146,7 +147,7 @@ def _of_ground(one: CycleCurve) -> Iterator[KeyValue]:
         found = {"maximum": high}
     else:
         found = {"first_peak": stance[first], "valley": valley, "second_peak": stance[second]}
-    gain = error_size("plate_gain", "Fz" if one.quantity == "ground_reaction_up" else "Fx")
+    gain = error_size(GAIN.name, "Fz" if one.quantity == "ground_reaction_up" else "Fx")
     yield from (_key(one, key, float(value), sd=gain * abs(float(value))) for key, value in found.items())
 
 
