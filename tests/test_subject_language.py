@@ -104,8 +104,8 @@ def test_a_language_that_is_not_there_is_refused_before_the_work_with_the_legal_
     [
         ('msgstr "Ihre Zahlen"', 'msgstr ""', "1 of the .* not translated, the first of them: 'Your numbers'"),
         ('msgstr "%(number)s Grad"', 'msgstr "Grad"', "'%\\(number\\)s degrees'"),
-        ('"Language: de\\n"', '"Language: qq\\n"', "the Language 'qq' is not known"),
-        ('"Language: de\\n"\n', "", "says no Language"),
+        ('"Language: de\\n"', '"Language: qq\\n"', "ours.po: the Language 'qq' is not known"),
+        ('"Language: de\\n"\n', "", "ours.po: says no Language"),
         ('msgstr "Ihre Zahlen"', "Ihre Zahlen", "is no catalogue of gettext"),
     ],
 )
@@ -115,5 +115,6 @@ def test_a_catalogue_of_ones_own_is_taken_or_refused_with_what_is_wrong(tmp_path
     own.write_text(text, encoding="utf-8")
     assert read_language(own).say("Your numbers") == "Ihre Zahlen"
     own.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(FileRefused, match=said):
+    with pytest.raises(FileRefused, match=said) as refused:
         read_language(own)
+    assert str(refused.value).count("ours.po") == 1

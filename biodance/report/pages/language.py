@@ -84,18 +84,17 @@ def read_language(name_or_path: str | Path = ENGLISH) -> Language:
 
 def _catalogue(path: Path) -> Catalog:
     """Return the content of a .po file whose header says a language that is known."""
+    text = read_text(path)
     try:
-        found = read_po(BytesIO(read_text(path).encode()), abort_invalid=True)
-        if found.locale is None:
-            said = found.locale_identifier
-            wrong = f"the Language {said!r} is not known" if said else "says no Language"
-            raise FileRefused(
-                f'{path}: {wrong}. Write "Language: de\\n" with the code of yours (ISO 639) into the header.'
-            )
+        found = read_po(BytesIO(text.encode()), abort_invalid=True)
     except (PoFileError, ValueError, UnknownLocaleError) as error:
         raise FileRefused(
             f"{path}: is no catalogue of gettext ({error}). Begin with a copy of biodance's en.po."
         ) from error
+    if found.locale is None:
+        said = found.locale_identifier
+        wrong = f"the Language {said!r} is not known" if said else "says no Language"
+        raise FileRefused(f'{path}: {wrong}. Write "Language: de\\n" with the code of yours (ISO 639) into the header.')
     return found
 
 
