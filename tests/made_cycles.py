@@ -7,6 +7,7 @@ from biodance.cycles.cut import Cycle
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.scores import SCORE_ANGLES
 from biodance.cycles.strides import Stride
+from biodance.cycles.summary import Repetitions, repetitions_of
 
 
 def cycle(start: float, side: str = "right", *, trial: str = "walk") -> Cycle:
@@ -29,3 +30,11 @@ def trial(name: str, curves: list[CycleCurve], *, shared: tuple[Cycle, ...] = ()
     cycles = tuple(dict.fromkeys(one.cycle for one in curves))
     strides = tuple(Stride(one, {"speed": 1.2, "cadence": 120.0}) for one in cycles)
     return TrialMovement(name, (), cycles, tuple(curves), strides, (np.empty(0), np.empty(0)), shared=shared)
+
+
+def walked_knees(right: float, left: float, count: int = 4) -> Repetitions:
+    """Walking with so many cycles of each side, whose knees bend by about so many degrees."""
+    shape = np.sin(np.linspace(0, np.pi, 101))
+    curves = [curve(cycle(k), (right + k) * shape) for k in range(count)]
+    curves += [curve(cycle(k, "left"), (left + k) * shape) for k in range(count)]
+    return repetitions_of("gait", [trial("walk", curves)])

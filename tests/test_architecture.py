@@ -73,7 +73,12 @@ CONTRACTS = {
     "biodance.observations": {"OBSERVER"},
 }
 """Family -> the names that every member gives because its contract asks for them."""
-FAMILIES = {*CONTRACTS, "biodance.body.tables.segment_data", "biodance.lab.markers.sets"}
+FAMILIES = {
+    *CONTRACTS,
+    "biodance.body.tables.segment_data",
+    "biodance.lab.markers.sets",
+    "biodance.report.pages.language",
+}
 """Where a family is found: each has its `FAMILY` (`biodance/discovery.py`)."""
 
 Graph = Mapping[str, set[str]]

@@ -10,6 +10,7 @@ from biodance.body.human.human import human
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import Cycle
 from biodance.cycles.ground import ground_curves
+from biodance.cycles.keys import key_values
 from biodance.cycles.strides import Stride
 from biodance.cycles.summary import LeftOutBecause, repetitions_of, symmetry_index
 from biodance.motion.soles import soles_from_body
@@ -89,6 +90,43 @@ def test_sides_stand_beside_each_other_with_the_interval_of_their_difference() -
     assert keys["maximum"].ci95 == pytest.approx((10 - half, 10 + half), abs=1e-3)
     assert keys["range"].symmetry == pytest.approx(100 * 10 / 57)
     assert np.isnan(keys["maximum"].symmetry)  # the zero of an angle is no amount
+
+
+def stance_of(*at: tuple[float, float]) -> np.ndarray:
+    """A curve through points (% of the cycle, value), zero in the swing from 60 %."""
+    return np.interp(np.arange(101), [0.0, *(x for x, _ in at), 60.0, 100.0], [0.0, *(y for _, y in at), 0.0, 0.0])
+
+
+def test_peaks_of_the_ground_reaction_of_both_sides() -> None:
+    up = {"right": stance_of((12, 110), (30, 75), (45, 120)), "left": stance_of((12, 100), (30, 80), (45, 115))}
+    forward = {"right": stance_of((10, -18), (30, 0), (50, 24)), "left": stance_of((10, -12), (30, 0), (50, 24))}
+    curves = [
+        curve(cycle(k, side), values[side], f"ground_reaction_{name}", "%")
+        for k in range(3)
+        for side in ("right", "left")
+        for name, values in (("up", up), ("forward", forward))
+    ]
+    keys = {key.name: key for key in repetitions_of("gait", [trial("walk", curves)]).keys}
+    told = {name.removeprefix("ground_reaction_"): (key.right.mean, key.left.mean) for name, key in keys.items()}
+    assert told == {
+        "up_first_peak": (110.0, 100.0),
+        "up_valley": (75.0, 80.0),
+        "up_second_peak": (120.0, 115.0),
+        "forward_braking_peak": (-18.0, -12.0),
+        "forward_pushing_peak": (24.0, 24.0),
+    }
+    assert keys["ground_reaction_up_first_peak"].difference == pytest.approx(10.0)
+    assert keys["ground_reaction_up_first_peak"].symmetry == pytest.approx(200 * 10 / 210)
+    assert keys["ground_reaction_forward_braking_peak"].symmetry == pytest.approx(40.0)  # right brakes harder
+
+
+def test_one_hump_has_one_maximum_and_a_stance_with_a_hole_no_peak() -> None:
+    one_hump = curve(cycle(0), stance_of((25, 240)), "ground_reaction_up", "%")
+    assert [(one.key, one.value) for one in key_values([one_hump])] == [("maximum", 240.0)]
+    for hole, count in ((40, 0), (80, 1)):
+        value = one_hump.value.copy()
+        value[hole] = np.nan
+        assert len(key_values([curve(cycle(0), value, "ground_reaction_up", "%")])) == count
 
 
 def test_what_both_sides_share_stands_in_the_middle() -> None:

@@ -35,7 +35,7 @@ from biodance.report.plates import plates_document, plates_page
 from biodance.report.write import write_diagnosis, write_report
 
 pytestmark = ASKED
-NAMES = ("report", "diagnose", "refused", "subject", "subject without numbers")
+NAMES = ("report", "diagnose", "refused", "subject", "subject in German", "subject without numbers")
 NAMES += ("cards", "foresee", "feedback", "group", "plates")
 
 
@@ -68,6 +68,7 @@ def _of_a_session(folder: Path) -> dict[str, Path]:
     for name, text in (
         ("refused", html_of(refused_session())),
         ("subject", subject_page(account_for(session_result()))),
+        ("subject in German", subject_page(account_for(session_result()), "de")),
         ("subject without numbers", subject_page(account_for(result, found))),
     ):
         pages[name] = folder / f"{name}.html"

@@ -40,10 +40,10 @@ def report_session(
     tables: Path | None = None,
     reference: "SessionIdentification | None" = None,
     lab: Path | None = None,
-    for_subject: bool = False,
+    for_subject: str | None = None,
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
-    person who was measured; return the result and the content of results.json.
+    person who was measured in that language; return the result and the content of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
@@ -64,7 +64,7 @@ def report_session(
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None, movement=moved)
     if for_subject:
-        write_subject_page(result, folder, diagnosis=found, movement=moved)
+        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
     return result, write_report(result, folder, diagnosis=found, movement=moved)
 
 
@@ -149,6 +149,10 @@ def report_command(
             help="Also write subject.html, a plain-language page for the person measured.",
         ),
     ] = False,
+    language: Annotated[
+        str | None,
+        Parameter(help="Write that page in this language: en, de, or the path of a catalogue of your own (*.po)."),
+    ] = None,
 ) -> int:
     """Process a session through all stages and write report.html and results.json.
 
@@ -157,11 +161,16 @@ def report_command(
     session
         Session folder: the static trial and the other trials.
     """
+    from biodance.report.pages.language import ENGLISH, read_language
+
+    spoken = language or (ENGLISH if subject_page else None)
+    if spoken:
+        read_language(spoken)  # what is wrong with it is said before the long work starts
     with progress() as tell:
         tables = results.make_tables_folder(session)
         result, before, place = examine_with_reference(session, reading, results, tell)
         result, found = report_session(
-            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=subject_page
+            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken
         )
         folder = put_session_results(place, result.session)
     results.show_page(folder)

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.body.tables.error_sizes import error_size
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride
+from biodance.lab.plates.faults import GAIN
 from biodance.records import SIDES, Array
 
 ANGLE_PANELS = (
@@ -20,6 +22,10 @@ LOAD_PANELS = (
     *("hip_power", "knee_power", "ankle_power"),
 )
 """The same of moments and powers."""
+GROUND_PEAKS = ("ground_reaction_up", "ground_reaction_forward")
+"""Ground reactions (% of body weight) of which peaks are told."""
+_VALLEY = 1.0
+"""% of body weight by which the valley lies below both vertical peaks at least: less is one peak, as in running."""
 _KNOWN = 0.8  # Share of a cycle that must be known for its peaks
 _OF_STANCE = "foot_progression"  # Its mean while the foot stands is told
 _INSTANTS: Mapping[str, tuple[str, str]] = {
@@ -39,11 +45,11 @@ _Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve
 
 @dataclass(frozen=True)
 class KeyValue:
-    """One number of one ``cycle``: its ``quantity``, which ``key`` of it ("maximum", "minimum", "range", "mean", or the
-    instant; "" where the quantity is a number), ``side``, ``value`` in ``unit``; ``sd`` what the inertial parameters
-    leave uncertain in it; ``rate`` 1/s: how fast the joint turns there (rad/s, powers), or one over the cycle's
-    duration (spatio-temporal values); of an angle ``span`` deg that it goes through in the cycle, and ``beside`` deg,
-    the root of the sum of squares of what the other angles of its joint go through.
+    """One number of one ``cycle``: its ``quantity``, which ``key`` of it ("maximum", "minimum", "range", "mean", a
+    peak, or the instant; "" where the quantity is a number), ``side``, ``value`` in ``unit``; ``sd`` what the inertial
+    parameters, or the gain of the plates, leave uncertain in it; ``rate`` 1/s: how fast the joint turns there (rad/s,
+    powers), or one over the cycle's duration (spatio-temporal values); of an angle ``span`` deg that it goes through in
+    the cycle, and ``beside`` deg, the root of the sum of squares of what the other angles of its joint go through.
     """
 
     cycle: Cycle
@@ -65,7 +71,7 @@ class KeyValue:
 
 def key_values(curves: Sequence[CycleCurve]) -> tuple[KeyValue, ...]:
     """Return the key values of all cycles: of angles (deg) maximum, minimum, range and the values at both instants of
-    the cycle; of moments (N·m/kg) and powers (W/kg) maximum and minimum.
+    the cycle; of moments (N·m/kg) and powers (W/kg) maximum and minimum; of the ground reaction (%) its peaks.
 
     A curve of which less than `_KNOWN` is known has none.
     """
@@ -77,6 +83,8 @@ def key_values(curves: Sequence[CycleCurve]) -> tuple[KeyValue, ...]:
             stands = one.value[(one.cycle.off_percent if one.cycle.kind == "gait" else 100.0) >= PERCENT]
             if np.isfinite(stands).any():
                 found.append(_key(one, "mean", float(np.nanmean(stands))))
+        elif one.quantity in GROUND_PEAKS:
+            found += _of_ground(one)
         elif np.isfinite(one.value).mean() <= _KNOWN:
             continue
         elif one.quantity in ANGLE_PANELS:
@@ -118,6 +126,29 @@ def _of_load(one: CycleCurve, angles: Mapping[_Curve, CycleCurve]) -> Iterator[K
         rate = float(_turning(turn)[at]) if turn is not None and one.unit == "W/kg" else 0.0
         sd, rate = np.nan_to_num([one.sd[at], rate]).tolist()
         yield _key(one, key, float(one.value[at]), sd=sd, rate=rate)
+
+
+def _of_ground(one: CycleCurve) -> Iterator[KeyValue]:
+    """Yield the peaks of the ground reaction on a foot whose whole stance is known.
+
+    Forwards the lowest value below zero (braking) and the highest above it (pushing); upwards the largest value in each
+    half of the stance and the valley between them, or one maximum where nothing is `_VALLEY` below both.
+    """
+    stance = one.value[one.cycle.off_percent >= PERCENT]
+    if stance.size < 2 or not np.isfinite(stance).all():
+        return
+    low, high, half = stance.min(), stance.max(), stance.size // 2
+    first, second = int(stance[:half].argmax()), half + int(stance[half:].argmax())
+    valley = stance[first : second + 1].min()
+    if one.quantity == "ground_reaction_forward":
+        found = {"braking_peak": low} if low < 0 else {}
+        found |= {"pushing_peak": high} if high > 0 else {}
+    elif valley > min(stance[first], stance[second]) - _VALLEY:
+        found = {"maximum": high}
+    else:
+        found = {"first_peak": stance[first], "valley": valley, "second_peak": stance[second]}
+    gain = error_size(GAIN.name, "Fz" if one.quantity == "ground_reaction_up" else "Fx")
+    yield from (_key(one, key, float(value), sd=gain * abs(float(value))) for key, value in found.items())
 
 
 def _turning(one: CycleCurve) -> Array:

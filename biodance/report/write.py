@@ -27,6 +27,7 @@ from biodance.records.attention import Attention
 from biodance.report.files import write_files
 from biodance.report.methods import METHODS, methods_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
+from biodance.report.pages.language import ENGLISH
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
@@ -84,9 +85,12 @@ def write_subject_page(
     *,
     diagnosis: SessionDiagnosis | None = None,
     movement: SessionMovement | None = None,
+    language: str | Path = ENGLISH,
 ) -> Path:
-    """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path."""
-    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis, movement))})
+    """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path; in a
+    ``language`` of `read_language`.
+    """
+    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis, movement), language)})
     return folder / SUBJECT_PAGE
 
 

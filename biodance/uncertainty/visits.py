@@ -119,6 +119,8 @@ _SKIN: Mapping[str, float] = {"pelvis": 0.12, "trunk": 0.2}
 """m, about how far from its middle the four markers of a segment lie whose skin goes with the limbs."""
 _LIMB_TURNS = 1.0
 """rad, about what a hip or a shoulder goes through in a cycle."""
+_INWARD = 5.0
+"""% of body weight, about what the ground pushes a walking foot sideways."""
 _EVENT = 0.009
 """s by which strikes differ from those that another program found in the same files (docs/benchmarks/movement.md)."""
 
@@ -153,6 +155,7 @@ def placement_sd(of: KeyKind) -> float:
       speed by marker times ``rate``. Stance (% of the stride) and the times of a step, on the ground and in the air
       change by `_EVENT`, double support by sqrt(2) of it; stride time and cadence, from one strike of a foot to its
       next, by nothing.
+    - The ground reaction forwards changes by turn `_INWARD`: forwards is where the markers say that the pelvis goes.
     """
     if of.unit == "deg":
         return _of_angle(of)
@@ -172,6 +175,7 @@ def placement_sd(of: KeyKind) -> float:
         "flight_time": _EVENT,
         "stance": 100 * _EVENT * of.rate,
         "double_support": 100 * two * _EVENT * of.rate,
+        "ground_reaction_forward": placement_sizes()["frame"] * _INWARD,
     }
     return sizes.get(of.quantity, 0.0)
 

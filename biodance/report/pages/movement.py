@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from biodance.cycles.curves import NormalCurve
-from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
+from biodance.cycles.keys import ANGLE_PANELS, GROUND_PEAKS, LOAD_PANELS
 from biodance.cycles.scores import SCORE_ANGLES, GaitScores
 from biodance.cycles.summary import KeySummary, LeftOutBecause, Repetitions, Spread
 from biodance.display import spaced
@@ -37,6 +37,8 @@ _FIRST = (
     *("knee_flexion_at_strike", "knee_flexion_maximum", "knee_flexion_range"),
     *("ankle_dorsiflexion_maximum", "ankle_dorsiflexion_minimum", "foot_progression_mean"),
     *("knee_flexion_moment_maximum", "ankle_dorsiflexion_moment_minimum", "ankle_power_maximum"),
+    *("ground_reaction_up_first_peak", "ground_reaction_up_second_peak", "ground_reaction_up_maximum"),
+    *("ground_reaction_forward_braking_peak", "ground_reaction_forward_pushing_peak"),
 )
 """Key values of walking that are seen at once; all others are folded."""
 
@@ -157,12 +159,12 @@ def _flags(found: Repetitions) -> list[str]:
 
 def _key(one: KeySummary) -> Row:
     """Return one key value as a row of text."""
-    apart = "–"
+    apart, unit = "–", "% of weight" if one.quantity in GROUND_PEAKS else one.unit
     if one.right and one.left:
         apart = _number(one.difference, one.unit)
         apart += f" ± {_number((one.ci95[1] - one.ci95[0]) / 2, one.unit)}" if one.ci95 else ""
     return {
-        "value": f"{spaced(one.name)} ({one.unit}{', middle' * (one.middle is not None)})",
+        "value": f"{spaced(one.name)} ({unit}{', middle' * (one.middle is not None)})",
         "right": _said(one.middle or one.right, one.unit),
         "left": _said(one.middle or one.left, one.unit),
         "apart": apart,

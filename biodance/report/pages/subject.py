@@ -4,15 +4,18 @@ from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.display import BLACK, BLUE, GREY, spaced
+from biodance.lab.session.file import VisitEntry
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.pipeline.still import silhouettes
 from biodance.records import Array
+from biodance.report.pages.language import ENGLISH, N_, Language, read_language
 from biodance.report.pages.subject_movement import plain_movement
 from biodance.report.pages.template import render, template_text
 
@@ -87,88 +90,96 @@ def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: _Room
 
 
 PLAIN_NAMES = {
-    "pelvis": "hips",
-    "right_thigh": "right thigh",
-    "right_shank": "right lower leg",
-    "right_foot": "right foot",
-    "left_thigh": "left thigh",
-    "left_shank": "left lower leg",
-    "left_foot": "left foot",
-    "trunk_head": "chest, belly and head",
-    "right_upper_arm": "right upper arm",
-    "right_forearm_hand": "right lower arm and hand",
-    "left_upper_arm": "left upper arm",
-    "left_forearm_hand": "left lower arm and hand",
+    "pelvis": N_("hips"),
+    "right_thigh": N_("right thigh"),
+    "right_shank": N_("right lower leg"),
+    "right_foot": N_("right foot"),
+    "left_thigh": N_("left thigh"),
+    "left_shank": N_("left lower leg"),
+    "left_foot": N_("left foot"),
+    "trunk_head": N_("chest, belly and head"),
+    "right_upper_arm": N_("right upper arm"),
+    "right_forearm_hand": N_("right lower arm and hand"),
+    "left_upper_arm": N_("left upper arm"),
+    "left_forearm_hand": N_("left lower arm and hand"),
 }
 _WHY = {
-    for_subject.WHY_STOPPED: "The work was stopped before its end.",
-    for_subject.WHY_NOTHING: "We have no test in which you moved while both feet were on our plates.",
-    for_subject.WHY_IMPOSSIBLE: "The numbers did not fit any real body. So something went wrong in the test.",
-    for_subject.WHY_DOUBTED: "The small balls on your skin did not tell us well where your joints are.",
-    for_subject.WHY_FAULTY: "The plates and the cameras did not agree. We must first find out why.",
-    "mass on the plates": "The weight on our plates was not the weight we wrote down.",
-    "centre of mass off": "The plates and the cameras did not agree on where you stood.",
-    "marker distance": "The small balls on your skin were not where our model of you had them.",
-    "posture left open": "The cameras could not see all parts of you all the time.",
-    "markers not seen": "The cameras lost some of the small balls on your skin for too long.",
-    "fully measured": "You had both feet on our plates for too short a time.",
-    "force difference": "The push on the plates was not what your moves should give.",
+    for_subject.WHY_STOPPED: N_("The work was stopped before its end."),
+    for_subject.WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
+    for_subject.WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
+    for_subject.WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
+    for_subject.WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
+    "mass on the plates": N_("The weight on our plates was not the weight we wrote down."),
+    "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
+    "marker distance": N_("The small balls on your skin were not where our model of you had them."),
+    "posture left open": N_("The cameras could not see all parts of you all the time."),
+    "markers not seen": N_("The cameras lost some of the small balls on your skin for too long."),
+    "fully measured": N_("You had both feet on our plates for too short a time."),
+    "force difference": N_("The push on the plates was not what your moves should give."),
 }
 """Reason for withholding, by its beginning -> a sentence for the subject."""
-_ELSE = "One of our checks failed."
+_ELSE = N_("One of our checks failed.")
 
 
-def plain_reasons(reasons: tuple[str, ...]) -> tuple[str, ...]:
+def plain_reasons(reasons: tuple[str, ...], words: Language) -> tuple[str, ...]:
     """Return sentences for the subject, each once."""
     said = [next((text for start, text in _WHY.items() if one.startswith(start)), _ELSE) for one in reasons]
-    return tuple(dict.fromkeys(said))
+    return tuple(words.say(one) for one in dict.fromkeys(said))
 
 
-def kilograms(part: PartMass) -> str:
+def kilograms(part: PartMass, words: Language) -> str:
     """Return the range of a part; "not measured well" where there is none."""
-    return _between(part.low, part.high) if part.measured else "not measured well"
+    return _between(part.low, part.high, words) if part.measured else words.say("not measured well")
 
 
-def subject_page(account: SubjectAccount) -> str:
-    """Return the page as HTML text; the same account gives the same characters."""
+def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str:
+    """Return the page as HTML text in a ``language`` of `read_language`; the same account gives the same characters."""
     from markupsafe import Markup
 
-    visit = account.visit
+    visit, words = account.visit, read_language(language)
+    facts = ((N_("Lab"), visit.lab), (N_("Done by"), visit.operator), (N_("Date"), words.date(visit.date)))
     return render(
         "subject.html.j2",
         style=Markup(template_text("subject.css")),
+        language=words.tag,
+        say=words.say,
         account=account,
-        moved=plain_movement(account.moved) if account.moved else None,
-        facts=[
-            (what, str(value)[:10] if what == "Date" else value)
-            for what, value in (("Lab", visit.lab), ("Done by", visit.operator), ("Date", visit.date))
-            if value
-        ],
-        parts=[(_name(part), kilograms(part), part) for part in account.parts],
-        picture=_picture(account, _WIDE),
-        small_picture=_picture(account, _PHONE),
-        weight=_between(*account.weight) if np.isfinite(account.weight[0]) else "",
-        together=(_name(account.together), kilograms(account.together)) if account.together else None,
-        reasons=plain_reasons(account.withheld),
+        moved=plain_movement(account.moved, words) if account.moved else None,
+        facts=[(words.say(what), value) for what, value in facts if value],
+        who=_whom_to_ask(visit, words),
+        parts=[(_name(part, words), kilograms(part, words), part) for part in account.parts],
+        picture=_picture(account, words, _WIDE),
+        small_picture=_picture(account, words, _PHONE),
+        weight=_between(*account.weight, words) if np.isfinite(account.weight[0]) else "",
+        together=(_name(account.together, words), kilograms(account.together, words)) if account.together else None,
+        reasons=plain_reasons(account.withheld, words),
     )
 
 
-def _picture(account: SubjectAccount, room: _Room) -> str:
+def _whom_to_ask(visit: VisitEntry, words: Language) -> str:
+    if visit.operator and visit.lab:
+        return words.say("%(person)s at %(lab)s", person=visit.operator, lab=visit.lab)
+    return visit.operator or visit.lab or words.say("the lab")
+
+
+def _picture(account: SubjectAccount, words: Language, room: _Room) -> str:
     """Return the address of the picture, "" without a body; on a phone the parts have no names: the table has."""
     if account.body is None or not account.parts:
         return ""
-    named = room is _WIDE
-    labels = {p.segments[0]: f"{_name(p)}\n{kilograms(p)}" if named else kilograms(p) for p in account.parts}
+    ranges = {part.segments[0]: kilograms(part, words) for part in account.parts}
+    names = {part.segments[0]: f"{_name(part, words)}\n" if room is _WIDE else "" for part in account.parts}
     measured = frozenset(p.segments[0] for p in account.parts if p.measured)
+    labels = {segment: names[segment] + said for segment, said in ranges.items()}
     drawn = subject_drawing(account.body, labels, measured, room=room)
     return "data:image/svg+xml;base64," + b64encode(drawn.encode()).decode("ascii")
 
 
-def _name(part: PartMass) -> str:
-    *first, last = [PLAIN_NAMES.get(name, spaced(name)) for name in part.segments]
-    return f"{', '.join(first)} and {last}" if first else last
+def _name(part: PartMass, words: Language) -> str:
+    *first, last = [words.say(PLAIN_NAMES[one]) if one in PLAIN_NAMES else spaced(one) for one in part.segments]
+    return words.say("%(first)s and %(last)s", first=", ".join(first), last=last) if first else last
 
 
-def _between(low: float, high: float) -> str:
+def _between(low: float, high: float, words: Language) -> str:
     """Return a range rounded outwards, so that it holds at least what was found."""
-    return f"{np.floor(10 * low) / 10:.1f} to {np.ceil(10 * high) / 10:.1f} kg"
+    least, most = np.floor(10 * low) / 10, np.ceil(10 * high) / 10
+    return words.say("%(low)s to %(high)s kg", low=words.number(least, 1), high=words.number(most, 1))

@@ -9,7 +9,7 @@ from biodance.cycles.cut import PERCENT
 from biodance.cycles.summary import KeySummary, Repetitions
 from biodance.records import SIDES
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, around, curve_line, panel
-from biodance.report.wording import format_number
+from biodance.report.pages.language import N_, Language
 
 
 @dataclass(frozen=True)
@@ -22,77 +22,96 @@ class PlainMovement:
     picture: str
 
 
-_TITLES = {"squat": "How you squatted", "sit_to_stand": "How you stood up"}
-_ACTS = {"squat": ("squat", "squats"), "sit_to_stand": ("rise from the chair", "rises from the chair")}
+_TITLES = {"squat": N_("How you squatted"), "sit_to_stand": N_("How you stood up")}
+_SIDES = {"right": N_("Right"), "left": N_("Left")}
 
 
-def plain_movement(found: Repetitions) -> PlainMovement:
+def plain_movement(found: Repetitions, words: Language) -> PlainMovement:
     """Return how somebody moved, by all good repetitions of one kind."""
     if found.kind == "gait":
-        title, said, rows = "How you ran" if found.runs else "How you walked", _walk(found), _steps(found)
+        title = words.say("How you ran") if found.runs else words.say("How you walked")
+        said, rows = _walk(found, words), _steps(found, words)
     else:
-        number, (one, more) = len(found.good), _ACTS[found.kind]
-        title, said, rows = _TITLES[found.kind], [f"We saw {number} {one if number == 1 else more}."], []
+        title, said, rows = words.say(_TITLES[found.kind]), [_counted(found, words)], []
     keys = {one.name: one for one in found.keys}
     knee = keys.get("knee_flexion_maximum")
     if knee is not None and knee.right is not None and knee.left is not None:
-        said = [*said, _knees(knee)]
-        left, right = (f"{format_number(one.mean, 0)} degrees" for one in (knee.left, knee.right))
-        rows = [*rows, ("How far the knee bends", left, right)]
-    return PlainMovement(title, said, rows, _picture(found))
+        said = [*said, _knees(knee, words)]
+        left, right = (words.say("%(number)s degrees", number=words.number(x.mean)) for x in (knee.left, knee.right))
+        rows = [*rows, (words.say("How far the knee bends"), left, right)]
+    return PlainMovement(title, said, rows, _picture(found, words))
 
 
-def _walk(found: Repetitions) -> list[str]:
+def _counted(found: Repetitions, words: Language) -> str:
+    number = len(found.good)
+    if found.kind == "squat":
+        return words.count("We saw %(number)s squat.", "We saw %(number)s squats.", number)
+    return words.count(
+        "We saw you stand up from the chair %(number)s time.",
+        "We saw you stand up from the chair %(number)s times.",
+        number,
+    )
+
+
+def _walk(found: Repetitions, words: Language) -> list[str]:
     values, counts = found.spatiotemporal(), [sum(one.side == side for one in found.good) for side in SIDES]
     if "speed" not in values:
         return []
-    speed, pace = values["speed"].mean, values["cadence"].mean
-    went = "ran" if found.runs else "walked"
+    went = (
+        N_("You ran %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
+        if found.runs
+        else N_("You walked %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
+    )
+    speed, (right, left) = values["speed"].mean, (words.number(one) for one in counts)
     return [
-        f"You {went} {format_number(speed, 1)} metres in a second. That is {format_number(3.6 * speed, 1)} kilometres "
-        "an hour.",
-        f"You made {format_number(pace, 0)} steps in a minute.",
-        f"We looked at {counts[0]} steps with the right foot and {counts[1]} with the left.",
+        words.say(went, speed=words.number(speed, 1), pace=words.number(3.6 * speed, 1)),
+        words.say("You made %(number)s steps in a minute.", number=words.number(values["cadence"].mean)),
+        words.say(
+            "We looked at %(right)s steps with the right foot and %(left)s with the left.", right=right, left=left
+        ),
     ]
 
 
-def _steps(found: Repetitions) -> list[tuple[str, str, str]]:
+def _steps(found: Repetitions, words: Language) -> list[tuple[str, str, str]]:
     """Return the length of a step and the time on the ground of both feet."""
     left, right = (found.spatiotemporal(side) for side in ("left", "right"))
     rows = []
-    for name, what, factor, unit in (
-        ("step_length", "How long a step is", 100.0, "cm"),
-        ("stance", "How long the foot is on the ground, out of each stride", 1.0, "%"),
+    for name, what, factor, sized in (
+        ("step_length", N_("How long a step is"), 100.0, N_("%(number)s cm")),
+        ("stance", N_("How long the foot is on the ground, out of each stride"), 1.0, N_("%(number)s %%")),
     ):
         if name in left and name in right:
-            one, other = (f"{format_number(factor * side[name].mean, 0)} {unit}" for side in (left, right))
-            rows.append((what, one, other))
+            one, other = (words.say(sized, number=words.number(factor * side[name].mean)) for side in (left, right))
+            rows.append((words.say(what), one, other))
     return rows
 
 
-def _knees(knee: KeySummary) -> str:
+def _knees(knee: KeySummary, words: Language) -> str:
     """Say whether the knees bend alike, as far as the repetitions tell."""
     if knee.ci95 is None:
-        return "There were too few of them to say if your two knees bend equally far."
+        return words.say("There were too few of them to say if your two knees bend equally far.")
     if knee.ci95[0] <= 0 <= knee.ci95[1]:
-        return "Your two knees bend equally far, as well as we can tell."
-    more = "right" if knee.difference > 0 else "left"
+        return words.say("Your two knees bend equally far, as well as we can tell.")
     size = abs(knee.difference)
     if size < 0.5:
-        return "Your two knees bend equally far, to less than one degree."
-    return f"Your {more} knee bends {format_number(size, 0)} degrees more than the other one."
+        return words.say("Your two knees bend equally far, to less than one degree.")
+    if knee.difference > 0:
+        more = N_("Your right knee bends %(number)s degrees more than the other one.")
+    else:
+        more = N_("Your left knee bends %(number)s degrees more than the other one.")
+    return words.say(more, number=words.number(size))
 
 
-def _picture(found: Repetitions) -> str:
+def _picture(found: Repetitions, words: Language) -> str:
     """Return the mean bend of both knees; "" where one of them is not known."""
     means = {one.side: one.mean for one in found.groups if one.quantity == "knee_flexion"}
     if set(means) < set(SIDES) or not all(np.isfinite(one).any() for one in means.values()):
         return ""
-    x = Axis(
-        0.0, 100.0, "from one step to the next of the same foot" if found.kind == "gait" else "from start to end", ()
-    )
-    y = around(np.concatenate(list(means.values())), least=20.0, label="bend of the knee (degrees)")
+    gait = found.kind == "gait"
+    along = words.say("from one step to the next of the same foot") if gait else words.say("from start to end")
+    x = Axis(0.0, 100.0, along, ())
+    y = around(np.concatenate(list(means.values())), least=20.0, label=words.say("bend of the knee (degrees)"))
     looks = {"right": RIGHT_SIDE, "left": LEFT_SIDE}
-    marks = [curve_line(x, y, PERCENT, means[side], looks[side], name=side) for side in SIDES]
-    about = "How far each knee bends over a step, right and left."
+    marks = [curve_line(x, y, PERCENT, means[side], looks[side], name=words.say(_SIDES[side])) for side in SIDES]
+    about = words.say("How far each knee bends, right and left.")
     return panel(x, y, marks, about, frame=Frame(width=480.0, height=150.0))

@@ -1,0 +1,128 @@
+"""The language of the subject's page: a catalogue of its sentences (gettext), and how numbers and dates are written.
+
+English is what the code says. A catalogue is one text file, ``<language>.po``; a laboratory gives its own by its path,
+or offers it under the entry points ``biodance.languages``.
+"""
+
+import re
+from dataclasses import dataclass
+from datetime import date
+from gettext import GNUTranslations
+from io import BytesIO
+from pathlib import Path
+
+from babel import Locale, UnknownLocaleError
+from babel.dates import format_date
+from babel.messages.catalog import Catalog
+from babel.messages.mofile import write_mo
+from babel.messages.pofile import PoFileError, read_po
+from babel.numbers import format_decimal
+
+from biodance.discovery import DataFamily
+from biodance.errors import FileRefused
+from biodance.lab.plain_text import read_text
+
+FAMILY = DataFamily("language", "biodance.languages", "report/languages", ".po")
+ENGLISH = "en"
+
+
+def N_(text: str) -> str:
+    """Return ``text`` as it is; marks a sentence of a table that is translated where it is said."""
+    return text
+
+
+@dataclass(frozen=True, eq=False)
+class Language:
+    """``tag`` of the page (``de``, ``pt-BR``), ``locale`` of its numbers and dates, ``catalogue`` of its sentences."""
+
+    tag: str
+    locale: Locale
+    catalogue: GNUTranslations
+
+    def say(self, text: str, **values: str) -> str:
+        """Return a sentence in this language with its ``values`` in their places."""
+        return self.catalogue.gettext(text) % values
+
+    def count(self, one: str, more: str, number: int) -> str:
+        """Return a sentence of a ``number`` of things: ``one`` or ``more`` by the plural rule of this language."""
+        return self.catalogue.ngettext(one, more, number) % {"number": self.number(number)}
+
+    def number(self, value: float, digits: int = 0) -> str:
+        """Return a number with so many ``digits`` after the decimal sign."""
+        return format_decimal(
+            round(float(value), digits), format=f"#,##0.{digits * '0'}".strip("."), locale=self.locale
+        )
+
+    def date(self, day: date | str | None) -> str:
+        """Return a day (a date, or as ISO 8601) in words; any other text as it is, "" for none."""
+        try:
+            return format_date(date.fromisoformat(str(day)[:10]), "long", locale=self.locale) if day else ""
+        except ValueError:
+            return str(day)
+
+
+def read_language(name_or_path: str | Path = ENGLISH) -> Language:
+    """Return a language by its name (``en``, ``de``, of an entry point), or a laboratory's own by the path of its .po.
+
+    Raises
+    ------
+    UnknownName
+        There is no such language; the message lists all.
+    FileRefused
+        The file is no catalogue, says no ``Language``, or does not have every sentence with its placeholders.
+    """
+    path = FAMILY.locate(name_or_path)
+    found = _catalogue(path)
+    if path != FAMILY.shipped()[ENGLISH]:
+        _refuse_gaps(path, found)
+    packed = BytesIO()
+    write_mo(packed, found)
+    packed.seek(0)
+    assert found.locale is not None  # _catalogue
+    return Language(str(found.locale).replace("_", "-"), found.locale, GNUTranslations(packed))
+
+
+def _catalogue(path: Path) -> Catalog:
+    """Return the content of a .po file whose header says a language that is known."""
+    text = read_text(path)
+    try:
+        found = read_po(BytesIO(text.encode()), abort_invalid=True)
+    except (PoFileError, ValueError, UnknownLocaleError) as error:
+        raise FileRefused(
+            f"{path}: is no catalogue of gettext ({error}). Begin with a copy of biodance's en.po."
+        ) from error
+    if found.locale is None:
+        said = found.locale_identifier
+        wrong = f"the Language {said!r} is not known" if said else "says no Language"
+        raise FileRefused(f'{path}: {wrong}. Write "Language: de\\n" with the code of yours (ISO 639) into the header.')
+    return found
+
+
+def _refuse_gaps(path: Path, found: Catalog) -> None:
+    """Refuse a catalogue in which a sentence is missing, or a placeholder such as ``%(number)s`` in one."""
+    needed = [one.id for one in _catalogue(FAMILY.shipped()[ENGLISH]) if one.id]
+    said = {one.id: one for one in found if not one.fuzzy}
+    missing = [one for one in needed if one not in said or not all(_texts(said[one].string))]
+    if missing:
+        first = _texts(missing[0])[0]
+        raise FileRefused(
+            f"{path}: {len(missing)} of the {len(needed)} sentences of the page are not translated, the first of them: "
+            f"{first!r}. Translate them; what a copy of biodance's en.po holds is all that is needed."
+        )
+    for one in needed:
+        places = _PLACE.findall(_texts(one)[0])
+        lost = [text for text in _texts(said[one].string) if sorted(_PLACE.findall(text)) != sorted(places)]
+        if lost:
+            raise FileRefused(
+                f"{path}: {lost[0]!r} is to hold {', '.join(places) or 'no per cent sign'}, as {_texts(one)[0]!r} "
+                "does. Correct the translation."
+            )
+
+
+_PLACE = re.compile(r"%(?:\(\w+\)s|.?)")
+"""What stands for a value in a sentence; also a per cent sign."""
+
+
+def _texts(said: str | list[str] | tuple[str, ...] | None) -> tuple[str, ...]:
+    """Return a message, or its singular and plurals."""
+    return (said or "",) if said is None or isinstance(said, str) else tuple(said)
