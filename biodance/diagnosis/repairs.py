@@ -68,8 +68,9 @@ def repairs(
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
     """Yield a marker that has moved, if it lies so far from its place in the static trial that this explains where the
-    joint seemed to be, and farther than it lies by itself (two standard deviations); one that was wrong in the static trial, too, is a joint elsewhere, and where that trial
-    contradicts itself beside the marker, nobody knows (`unplaced_markers`).
+    joint seemed to be, and farther than by itself (two standard deviations); one that was wrong in the static trial,
+    too, is a joint elsewhere, and where that trial contradicts itself beside the marker, nobody knows
+    (`unplaced_markers`).
     """
     if error.spared not in effect.targets(cases[0]) or error.spared in unplaced_markers(cases[0].body):
         return
