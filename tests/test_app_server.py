@@ -352,3 +352,35 @@ def test_zip_of_tables_and_workbook(user, archive):
     assert "<v>62.5</v>" in sheet
     assert "<f>" not in sheet
     assert "'=1+1" in book.read("xl/sharedStrings.xml").decode()
+
+
+def strike(time: float, kind: str = "strike") -> dict:
+    return {"side": "left", "kind": kind, "time": time}
+
+
+def test_steps_are_set_by_hand_and_undone(user, archive):
+    some = [strike(0.2), strike(0.6, "off")]
+    told = edited(user, [["trials", "squat_1", "events"], some])
+    (row,) = [one for one in told["trials"] if one["stem"] == "squat_1"]
+    assert row["events"] == [
+        {"time_s": 0.2, "side": "left", "down": True, "source": "hand"},
+        {"time_s": 0.6, "side": "left", "down": False, "source": "hand"},
+    ]
+    assert tomllib.loads(session_toml(archive).read_text())["trials"]["squat_1"]["events"] == some
+    back = post(user, "undo", name=NAME, revision=told["revision"])
+    assert all(one["events"] == [] for one in back["trials"])
+
+
+def test_what_steps_change_is_not_told_before_a_run(user):
+    answer = user.get("/api/strides", params={"name": NAME, "trial": "squat_1"})
+    assert answer.status_code == 400
+    assert "no results yet" in answer.json()["error"]
+
+
+def test_a_strike_without_a_foot_off_is_refused_and_nothing_written(user, archive):
+    body = {"name": NAME, "revision": viewed(user)["revision"]}
+    changes = [[["trials", "squat_1", "events"], [strike(0.2), strike(0.6)]]]
+    answer = user.post("/api/edit", json={**body, "changes": changes}, headers=ORIGIN)
+    assert answer.status_code == 400
+    assert "no off between" in answer.json()["error"]
+    assert not session_toml(archive).exists()

@@ -49,7 +49,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
             return Response("There is nothing here.", 404, media_type="text/plain")
         return Response(known[name], media_type=_KINDS[Path(name).suffix])
 
-    reads = (window.listed, window.session, window.state, window.markers, window.forces, window.results)
+    reads = (window.listed, window.session, window.state, window.markers, window.forces, window.results, window.strides)
     writes = (window.edit, window.text, window.undo, window.redo, window.run, window.stop, window.accept, window.keep)
     routes = [
         Route("/", static),

@@ -12,7 +12,9 @@ from biodance.app.outputs import (
     csv_archive,
     exported,
     page_part,
+    read_results,
     results_file,
+    run_command,
     shown_results,
     workbook,
 )
@@ -21,6 +23,7 @@ from biodance.app.run import Worker
 from biodance.app.sessions import Archive, SessionPlace
 from biodance.app.view import SessionView
 from biodance.errors import BiodanceError
+from biodance.library import parse_json
 from biodance.records import Trial
 from biodance.version import __version__
 
@@ -101,6 +104,14 @@ class Window:
     def results(self, asked: Asked) -> dict[str, Any]:
         """Return what the last run found."""
         return shown_results(self._place(asked))
+
+    def strides(self, asked: Asked) -> dict[str, Any]:
+        """Return the spatio-temporal values of a trial in the last run, and with session.toml as it is now."""
+        place, trial = self._place(asked), self._trial(asked)
+        read_results(place)
+        about = (str(place.results), str(place.folder), trial.name, trial.source.path.stem)
+        with self._one_export:
+            return {"rows": parse_json(run_command(*about, module="biodance.app.steps"))}
 
     def run(self, asked: Asked) -> dict[str, Any]:
         """Begin a run over sessions."""
