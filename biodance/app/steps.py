@@ -24,8 +24,8 @@ _OF_MASSES = ("margin_aside", "margin_ahead", "vertical_stiffness")
 
 def stride_rows(results: Path, session: Path, trial: str, stem: str) -> list[dict[str, Any]]:
     """Return the spatio-temporal values of a ``trial`` (file ``stem``), but `_OF_MASSES`, by ``quantity``, ``unit`` and
-    ``side``: ``before``, the mean of the last run, in ``results``, and ``after`` over ``count`` strides, with the events and the
-    spans left out that the session.toml of the ``session`` says now; None = no value.
+    ``side``: ``before``, the mean of the last run, in ``results``, and ``after`` over ``count`` strides, with the
+    events and the spans left out that the session.toml of the ``session`` says now; None = no value.
 
     Raises
     ------
