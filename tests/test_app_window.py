@@ -235,6 +235,24 @@ def test_nobody_is_shut_out_of_a_tab(browser, tab):
     browser.send("Emulation.clearDeviceMetricsOverride")
 
 
+def test_another_folder_is_chosen_in_the_window(browser, archive):
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    browser.run("document.querySelector('[data-key=folder]').click()")
+    browser.until("Boolean(document.querySelector('[aria-label=\"Look into S01\"]'))")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    browser.run("document.querySelector('[aria-label=\"Look into S01\"]').click()")
+    browser.until("document.querySelector('details p').textContent.endsWith('S01')")
+    browser.run("document.querySelector('[data-key=open]').click()")
+    browser.until("document.querySelectorAll('tbody tr').length === 1")
+    browser.run(
+        f"fetch('/api/open', {{method: 'POST', headers: {{'Content-Type': 'application/json'}}, "
+        f"body: JSON.stringify({{folder: {str(archive)!r}}})}})"
+    )
+    go(browser, "#/S01/trials", "document.querySelector('[data-key=mass_kg]')")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+
+
 def test_nobody_is_shut_out_of_the_list_or_a_session_that_cannot_be_read(browser):
     go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
     assert complaints(browser) == []
