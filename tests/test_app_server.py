@@ -352,3 +352,89 @@ def test_zip_of_tables_and_workbook(user, archive):
     assert "<v>62.5</v>" in sheet
     assert "<f>" not in sheet
     assert "'=1+1" in book.read("xl/sharedStrings.xml").decode()
+
+
+def strike(time: float, kind: str = "strike") -> dict:
+    return {"side": "left", "kind": kind, "time": time}
+
+
+def test_steps_are_set_by_hand_and_undone(user, archive):
+    some = [strike(0.2), strike(0.6, "off")]
+    told = edited(user, [["trials", "squat_1", "events"], some])
+    (row,) = [one for one in told["trials"] if one["stem"] == "squat_1"]
+    assert row["events"] == [
+        {"time_s": 0.2, "side": "left", "down": True, "source": "hand"},
+        {"time_s": 0.6, "side": "left", "down": False, "source": "hand"},
+    ]
+    assert tomllib.loads(session_toml(archive).read_text())["trials"]["squat_1"]["events"] == some
+    back = post(user, "undo", name=NAME, revision=told["revision"])
+    assert all(one["events"] == [] for one in back["trials"])
+
+
+def test_what_steps_change_is_not_told_before_a_run(user):
+    answer = user.get("/api/strides", params={"name": NAME, "trial": "squat_1"})
+    assert answer.status_code == 400
+    assert "no results yet" in answer.json()["error"]
+
+
+def test_a_strike_without_a_foot_off_is_refused_and_nothing_written(user, archive):
+    body = {"name": NAME, "revision": viewed(user)["revision"]}
+    changes = [[["trials", "squat_1", "events"], [strike(0.2), strike(0.6)]]]
+    answer = user.post("/api/edit", json={**body, "changes": changes}, headers=ORIGIN)
+    assert answer.status_code == 400
+    assert "no off between" in answer.json()["error"]
+    assert not session_toml(archive).exists()
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    write_trial(tmp_path / "home" / "study" / "S09", "static")
+    write_trial(tmp_path / "elsewhere" / "S08", "static")
+    (tmp_path / "home" / "way_out").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "home" / ".hidden").mkdir()
+    return tmp_path / "home"
+
+
+def test_another_folder_of_the_home_is_found_and_opened(home, user):
+    told = user.get("/api/folders", params={"folder": str(home)}).json()
+    assert told["folders"] == ["study"]  # neither hidden folders nor links that lead elsewhere
+    assert told["above"] == ""
+    assert user.get("/api/folders", params={"folder": str(home / "study")}).json()["above"] == str(home)
+    opened = post(user, "open", folder=str(home / "study"))
+    assert [row["name"] for row in opened["rows"]] == ["S09"]
+    assert opened["out"] == str(home / "study-results")
+    assert viewed(user, "S09")["why"] == ""
+    assert user.get("/api/session", params={"name": NAME}).status_code == 404
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/etc", "elsewhere", "home/way_out", "home/../elsewhere", "home/nobody", "home/\0"]
+)
+def test_no_folder_elsewhere_is_shown_or_opened(home, user, path):
+    path = path if path.startswith("/") else f"{home.parent}/{path}"
+    shown = user.get("/api/folders", params={"folder": path})
+    opened = user.post("/api/open", json={"folder": path}, headers=ORIGIN)
+    assert (shown.status_code, opened.status_code) == (400, 400)
+    assert "folders" not in shown.json()
+    assert viewed(user)["why"] == ""  # what was open stays open
+
+
+def test_a_folder_without_a_session_leaves_what_is_open(home, user):
+    (home / "empty").mkdir()
+    answer = user.post("/api/open", json={"folder": str(home / "empty")}, headers=ORIGIN)
+    assert answer.status_code == 400
+    assert viewed(user)["why"] == ""
+    assert not (home / "empty-results").exists()
+
+
+def test_a_stranger_sees_no_folder(home, stranger):
+    assert stranger.get("/api/folders", params={"folder": str(home)}).status_code == 403
+    assert stranger.post("/api/open", json={"folder": str(home)}, headers=ORIGIN).status_code == 403
+
+
+def test_the_corrected_copies_among_the_results_are_opened_as_a_session(user, archive):
+    copies = archive.out / "accepted" / "S02" / "corrected"
+    write_trial(copies, "static")
+    assert [row["name"] for row in post(user, "open", folder=str(copies))["rows"]] == ["corrected"]
+    assert [one["stem"] for one in viewed(user, "corrected")["trials"]] == ["static"]

@@ -155,6 +155,76 @@ def test_a_squat_is_switched_off_and_the_next_run_leaves_it_out(browser, archive
     browser.until(f"{rows} === {before - 1}")
 
 
+def events_of(archive: Path) -> list[dict]:
+    return tomllib.loads((archive / "S01" / "session.toml").read_text(encoding="utf-8"))["trials"]["squat_1"].get(
+        "events", []
+    )
+
+
+def add(browser: Page, what: str, time: float) -> None:
+    browser.run(
+        f"document.querySelector('[aria-label=\"Time of the event, in s\"]').value = '{time}'; "
+        f"document.querySelector('[data-key=\"add {what}\"]').click()"
+    )
+
+
+def take(browser: Page, what: str) -> None:
+    browser.until(f"(one => one ? (one.focus(), true) : false)(document.querySelector('[data-key=\"event {what}\"]'))")
+
+
+def key(browser: Page, name: str) -> None:
+    for kind in ("keyDown", "keyUp"):
+        browser.send("Input.dispatchKeyEvent", type=kind, key=name, code=name)
+
+
+def test_steps_are_added_moved_and_taken_out_by_keyboard_and_pointer(browser, archive):
+    go(browser, "#/S01/steps", "document.querySelector('[data-key=\"add left strike\"]')")
+    events = "document.querySelectorAll('g.event').length"
+    add(browser, "left strike", 1.0)
+    browser.until(f"{events} === 1")
+    add(browser, "left strike", 2.0)  # without an off between them: said, kept in the window, not written
+    browser.until("document.querySelector('#said').textContent.includes('no off between')")
+    browser.until(f"{events} === 2")
+    assert [one["time"] for one in events_of(archive)] == [1.0]
+    add(browser, "left off", 1.6)
+    browser.until("document.querySelector('#said').hidden && !document.querySelector('[data-key=discard]')")
+    assert [(one["kind"], one["time"]) for one in events_of(archive)] == [
+        ("strike", 1.0),
+        ("off", 1.6),
+        ("strike", 2.0),
+    ]
+
+    time.sleep(1.0)  # the answer is drawn
+    take(browser, "left off 0")
+    key(browser, "ArrowRight")
+    key(browser, "ArrowRight")
+    browser.until("document.querySelector('[data-key=\"event left off 0\"]').ariaLabel.includes('1.620')")
+    end = time.monotonic() + 10
+    while [one["time"] for one in events_of(archive)] != [1.0, 1.62, 2.0]:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+    time.sleep(1.0)  # the answer is drawn
+    box = "(b => [b.left + b.width / 2, b.top + b.height / 2])(document.querySelector("
+    browser.run("document.querySelector('g.event').scrollIntoView({block: 'center'})")
+    x, y = browser.run(f"{box}'[data-key=\"event left strike 1\"]').getBoundingClientRect())")
+    for kind, way in (("mousePressed", 0), ("mouseMoved", 20), ("mouseMoved", 40), ("mouseReleased", 40)):
+        browser.send("Input.dispatchMouseEvent", type=kind, x=x + way, y=y, button="left", buttons=1, clickCount=1)
+    browser.until("document.querySelector('[data-key=undo]').disabled === false")
+    end = time.monotonic() + 10
+    while not events_of(archive)[-1]["time"] > 2.05:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+    time.sleep(1.0)
+    take(browser, "left strike 1")
+    key(browser, "Delete")
+    browser.until(f"{events} === 2")
+    press(browser, "Use those found again")
+    browser.until(f"{events} === 0")
+    assert events_of(archive) == []
+
+
 @pytest.mark.parametrize("tab", TABS)
 def test_nobody_is_shut_out_of_a_tab(browser, tab):
     go(browser, f"#/S01/{tab}", f"document.querySelector('#tab-{tab}')?.ariaSelected === 'true'")
@@ -163,6 +233,25 @@ def test_nobody_is_shut_out_of_a_tab(browser, tab):
     browser.run("document.querySelectorAll('details').forEach(one => one.open = true)")
     assert complaints(browser) == []
     browser.send("Emulation.clearDeviceMetricsOverride")
+
+
+def test_another_folder_is_chosen_in_the_window(browser, archive):
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    chooser = "document.querySelector('[data-key=folder]')"
+    found = "Boolean(document.querySelector('[aria-label=\"Look into S01\"]'))"
+    browser.until(f"{found} || ({chooser}.parentElement.open || {chooser}.click(), false)")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    browser.run("document.querySelector('[aria-label=\"Look into S01\"]').click()")
+    browser.until("document.querySelector('details p').textContent.endsWith('S01')")
+    browser.run("document.querySelector('[data-key=open]').click()")
+    browser.until("document.querySelectorAll('tbody tr').length === 1")
+    browser.run(
+        f"fetch('/api/open', {{method: 'POST', headers: {{'Content-Type': 'application/json'}}, "
+        f"body: JSON.stringify({{folder: {str(archive)!r}}})}})"
+    )
+    go(browser, "#/S01/trials", "document.querySelector('[data-key=mass_kg]')")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
 
 
 def test_nobody_is_shut_out_of_the_list_or_a_session_that_cannot_be_read(browser):

@@ -22,20 +22,20 @@ from biodance.cycles.curves import (
 )
 from biodance.cycles.cut import (
     Cycle,
-    FootEvent,
     agreement_of_events,
     gait_cycles,
     joined_events,
     kinematic_events,
     repetitions,
 )
+from biodance.cycles.movement import trial_movement
 from biodance.cycles.strides import mean_values, strides, vertical_stiffness
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import movement_of
-from biodance.records import Motion, Subject, Wrench
+from biodance.records import FootEvent, Motion, Subject, Wrench
 
 BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))
 RATE = 100.0
@@ -332,3 +332,21 @@ def test_that_the_shares_of_two_feet_on_one_plate_are_an_estimate_is_said():
     assert moved.told == "1 squat"
     assert any("not measured" in note for note in moved.notes)
     assert "no moments" in movement_of(replace(one, trial=replace(one.trial, plates=())), SQUATTER, None).notes[0]
+
+
+def test_events_by_hand_take_the_place_of_those_found_of_their_foot_and_the_cycles_follow():
+    moved, _ = walk()
+    trial = squat().trial
+    found = trial_movement(trial, BODY, moved)
+    times = {True: (0.31, 1.41, 2.51), False: (1.0, 2.2)}
+    events = tuple(FootEvent(t, "left", down, "hand") for down, some in times.items() for t in some)
+    told = trial_movement(replace(trial, events=events), BODY, moved)
+    left = [one for one in told.events if one.side == "left"]
+    assert [one.time for one in left] == [0.31, 1.0, 1.41, 2.2, 2.51]
+    assert {one.source for one in left} == {"hand"}
+    assert [one for one in told.events if one.side == "right"] == [one for one in found.events if one.side == "right"]
+    ours = [(one.start, one.end, one.off) for one in told.cycles if one.side == "left"]
+    assert ours == [(0.31, 1.41, 1.0), (1.41, 2.51, 2.2)]
+    strides_left = [one.values for one in told.strides if one.cycle.side == "left"]
+    assert strides_left[0]["stance"] == pytest.approx(100 * 0.69 / 1.1)
+    assert strides_left[0]["stride_time"] == pytest.approx(1.1)

@@ -19,9 +19,10 @@ from biodance.lab.corrections import (
     read_corrections,
 )
 from biodance.lab.read import read_trial
+from biodance.lab.session.file import read_session_file
 from biodance.pipeline.accepted import write_corrected
 from biodance.pipeline.lab_file import read_lab
-from biodance.records import Plate, Session, Subject, Trial, Wrench
+from biodance.records import FootEvent, LeftOutSpan, Plate, Session, Subject, Trial, Wrench
 
 
 def off(one: Trial, correction: PlateCorrection) -> float:
@@ -151,3 +152,12 @@ def test_a_corrected_copy_says_no_more_of_the_person_than_was_known(tmp_path: Pa
     said = tomllib.loads((tmp_path / "corrected/session.toml").read_text())
     assert said["subject"] == {"height_m": 1.7, "age": 30.0}
     assert said["markers"] == {"file": str((tmp_path / "own.toml").resolve())}
+
+
+def test_a_corrected_copy_keeps_what_the_analyst_said_of_the_steps(tmp_path: Path) -> None:
+    spans = (LeftOutSpan(0.1, 0.2), LeftOutSpan(0.3, 0.4, "left"))
+    events = (FootEvent(0.1, "left", True, "hand"), FootEvent(0.25, "left", False, "hand"))
+    told = replace(trial(), role="fit", left_out=spans, events=events)
+    write_corrected(Session(Subject(66.0, 1.7, "F", 30.0), (told,), tmp_path), (), (), tmp_path / "corrected")
+    parts = read_session_file(tmp_path / "corrected").parts("t")
+    assert (parts.left_out, parts.events) == (spans, events)

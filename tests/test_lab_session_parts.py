@@ -121,6 +121,12 @@ def test_a_squat_that_reaches_into_a_span_left_out_is_not_told(tmp_path):
         ('[trials.a]\nexchange = [["LKNE", "LKNE"]]', "exchange"),
         ('[trials.a]\nexchange = [["LKNE", "RKNE", 2.0, 1.0]]', "exchange"),
         ('[trials.a]\nexchange = [["LKNE", "RKNE", 2.0]]', "exchange"),
+        ('[trials.a]\nevents = [{side = "left", kind = "strike"}]', "time in s"),
+        ('[trials.a]\nevents = [{side = "left", kind = "strike", time = "1"}]', "time in s"),
+        ('[trials.a]\nevents = [{side = "left", kind = "strike", time = nan}]', "time in s"),
+        ('[trials.a]\nevents = [{side = "left", kind = "stirke", time = 1}]', "strike, off"),
+        ('[trials.a]\nevents = [{side = "both", kind = "strike", time = 1}]', "left, right"),
+        ('[trials.a]\nevents = [{side = "left", kind = "off", tiem = 1}]', "Did you mean 'time'"),
         ("[trials.a]\nleave_out = [[2.0]]", "leave_out"),
         ("[trials.a]\nleave_out = [[2.0, 1.0]]", "leave_out"),
         ("[trials.a]\nleave_out = [[1.0, nan]]", "leave_out"),
@@ -133,6 +139,42 @@ def test_a_squat_that_reaches_into_a_span_left_out_is_not_told(tmp_path):
 def test_what_is_not_legal_is_refused_before_it_is_written(folder, text, word):
     with pytest.raises(SessionRefused if "map" not in text else Exception, match=word):
         check_session_text(folder / "session.toml", text)
+
+
+def event(side: str, kind: str, time: float) -> str:
+    return f'{{side = "{side}", kind = "{kind}", time = {time}}}'
+
+
+def test_strikes_and_offs_of_a_foot_are_read_in_the_order_of_time(folder):
+    before = moving(folder)
+    assert before.events == ()
+    some = ", ".join([event("left", "off", 0.6), event("left", "strike", 0.2), event("right", "strike", 0.5)])
+    told(folder, f"[trials.{before.name}]\nevents = [{some}]\n")
+    trial = moving(folder)
+    assert [(one.time, one.side, one.down, one.source) for one in trial.events] == [
+        (0.2, "left", True, "hand"),
+        (0.5, "right", True, "hand"),
+        (0.6, "left", False, "hand"),
+    ]
+    assert any("3 strikes and offs of the right and left foot were set by hand" in line for line in trial.history)
+
+
+@pytest.mark.parametrize(("kind", "missing"), [("strike", "no off"), ("off", "no strike")])
+def test_a_strike_without_an_off_and_an_off_without_a_strike_are_refused(folder, kind, missing):
+    other = event("right", "off" if kind == "strike" else "strike", 1.0)  # of the other foot: it helps nothing
+    text = f"[trials.a]\nevents = [{event('left', kind, 0.5)}, {other}, {event('left', kind, 1.5)}]"
+    with pytest.raises(SessionRefused, match=rf"left {kind} at 0.5 s and then the left {kind} at 1.5 s with {missing}"):
+        check_session_text(folder / "session.toml", text)
+
+
+def test_an_event_that_is_not_within_the_recording_refuses_it(folder):
+    name = moving(folder).name
+    told(folder, f"[trials.{name}]\nevents = [{event('left', 'strike', 7.5)}]\n")
+    session = read_session(folder)
+    assert [trial.role for trial in session] == ["static"]
+    (why,) = session.refused.values()
+    assert "left strike at 7.5 s" in why
+    assert "0 to 0.999 s" in why
 
 
 def test_a_text_that_is_no_toml_is_refused_with_its_line(folder):

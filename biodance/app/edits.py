@@ -180,9 +180,15 @@ def _inline(value: Any) -> Any:
     """Return a value as it is written on one line, whatever it holds."""
     if isinstance(value, list):
         array = tomlkit.array()
-        array.extend(_inline(one) for one in value)
+        array.extend(_in_braces(one) if isinstance(one, dict) else _inline(one) for one in value)
         return array
     return tomlkit.item(value)
+
+
+def _in_braces(value: dict[str, Any]) -> Any:
+    table = tomlkit.inline_table()
+    table.update(value)
+    return table
 
 
 def _take_out(document: Container, keys: list[str]) -> None:

@@ -66,11 +66,16 @@ class Worker:
             Another run is not finished.
         """
         with self._lock:
-            if self._run is not None and self._run.state is RunState.RUNNING:
+            if self.running:
                 raise BiodanceError("Another run is not finished. Wait for it, or stop it.")
             self._run = SessionRun(tuple(one.name for one in places))
             self._thread = threading.Thread(target=self._go, args=(self._run, tuple(places)), daemon=True)
             self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether a run is not finished."""
+        return self._run is not None and self._run.state is RunState.RUNNING
 
     def stop(self) -> None:
         """Stop the run; what is at work is killed, what is done stays. Returns when nothing works any more."""

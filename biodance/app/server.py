@@ -49,8 +49,27 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
             return Response("There is nothing here.", 404, media_type="text/plain")
         return Response(known[name], media_type=_KINDS[Path(name).suffix])
 
-    reads = (window.listed, window.session, window.state, window.markers, window.forces, window.results)
-    writes = (window.edit, window.text, window.undo, window.redo, window.run, window.stop, window.accept, window.keep)
+    reads = (
+        window.listed,
+        window.session,
+        window.state,
+        window.markers,
+        window.forces,
+        window.results,
+        window.strides,
+        window.folders,
+    )
+    writes = (
+        window.edit,
+        window.text,
+        window.undo,
+        window.redo,
+        window.run,
+        window.stop,
+        window.accept,
+        window.keep,
+        window.open,
+    )
     routes = [
         Route("/", static),
         Route("/static/{name}", static),

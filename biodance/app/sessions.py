@@ -18,6 +18,11 @@ HISTORY = "history"
 """Folder of the states of every session.toml, in that of the results."""
 
 
+def results_beside(folder: Path) -> Path:
+    """Return where the results of a folder go unless another place is named."""
+    return folder.with_name(f"{folder.name}-results")
+
+
 @dataclass(frozen=True)
 class SessionPlace:
     """One session of the window: its ``name`` below the archive, the ``folder`` of its recordings, the folder

@@ -20,7 +20,7 @@ from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.plate_entry import plate_channels
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
-from biodance.records import ROLES, Plate, Session, Trial
+from biodance.records import ROLES, FootEvent, Plate, Session, Trial
 from biodance.report.tables.schema import plain_values
 
 
@@ -106,6 +106,7 @@ class SessionView:
                 "told": role is not None,
                 "why": session.refused.get(path.name, ""),
                 "exchange": [_exchange(one.one, one.other, one.start, one.end) for one in parts.exchanges],
+                "events": [_event(one) for one in parts.events],
                 "leave_out": [[one.start, one.end, *([one.side] if one.side else [])] for one in parts.left_out],
             }
             yield row | (_of_trial(trial) if trial else {"name": ""})
@@ -167,6 +168,10 @@ def _places(worn: MarkerSet) -> dict[str, str]:
 
 def _exchange(one: str, other: str, start: float, end: float) -> list[Any]:
     return [one, other, start, end] if math.isfinite(start) else [one, other]
+
+
+def _event(one: FootEvent) -> dict[str, Any]:
+    return {"time_s": one.time, "side": one.side, "down": one.down, "source": one.source}
 
 
 def _of_trial(trial: Trial) -> dict[str, Any]:

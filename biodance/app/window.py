@@ -2,25 +2,30 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Lock
 from typing import Any
 
 from starlette.responses import Response
 
 from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
+from biodance.app.folders import allowed_folder, folders_document
 from biodance.app.outputs import (
     csv_archive,
     exported,
     page_part,
+    read_results,
     results_file,
+    run_command,
     shown_results,
     workbook,
 )
 from biodance.app.recording import forces_document, markers_document
 from biodance.app.run import Worker
-from biodance.app.sessions import Archive, SessionPlace
+from biodance.app.sessions import Archive, SessionPlace, results_beside
 from biodance.app.view import SessionView
 from biodance.errors import BiodanceError
+from biodance.library import parse_json
 from biodance.records import Trial
 from biodance.version import __version__
 
@@ -48,6 +53,7 @@ class Window:
 
     def __init__(self, archive: Archive) -> None:
         self.archive, self.worker = archive, Worker(archive)
+        self._roots = tuple(dict.fromkeys(one.resolve() for one in (Path.home(), archive.out, archive.folder)))
         self._view: SessionView | None = None
         self._lock, self._one_export = Lock(), Lock()
 
@@ -56,6 +62,20 @@ class Window:
         self.archive.look()
         told = {"folder": str(self.archive.folder.resolve()), "out": str(self.archive.out), "version": __version__}
         return told | {"rows": self.archive.rows(), "run": self.worker.document()}
+
+    def folders(self, asked: Asked) -> dict[str, Any]:
+        """Return the folders in one, to choose from."""
+        return folders_document(asked.text("folder"), self._roots)
+
+    def open(self, asked: Asked) -> dict[str, Any]:
+        """Show the sessions of another folder; its results go beside it."""
+        folder = allowed_folder(asked.text("folder"), self._roots)
+        with self._lock:
+            if self.worker.running:
+                raise BiodanceError("A run is not finished. Wait for it, or stop it, before another folder is opened.")
+            archive = Archive(folder, results_beside(folder))
+            self.archive, self.worker, self._view = archive, Worker(archive), None
+        return self.listed(asked)
 
     def session(self, asked: Asked) -> dict[str, Any]:
         """Return one session as it is read now."""
@@ -101,6 +121,14 @@ class Window:
     def results(self, asked: Asked) -> dict[str, Any]:
         """Return what the last run found."""
         return shown_results(self._place(asked))
+
+    def strides(self, asked: Asked) -> dict[str, Any]:
+        """Return the spatio-temporal values of a trial in the last run, and with session.toml as it is now."""
+        place, trial = self._place(asked), self._trial(asked)
+        read_results(place)
+        about = (str(place.results), str(place.folder), trial.name, trial.source.path.stem)
+        with self._one_export:
+            return {"rows": parse_json(run_command(*about, module="biodance.app.steps"))}
 
     def run(self, asked: Asked) -> dict[str, Any]:
         """Begin a run over sessions."""

@@ -31,9 +31,10 @@ def app_command(
     import sys
 
     from biodance.app.server import serve_window
+    from biodance.app.sessions import results_beside
 
     place = Path(folder or ".").resolve()
-    results = out or place.with_name(f"{place.name}-results")
+    results = out or results_beside(place)
 
     def tell(address: str) -> None:
         sys.stdout.write(f"{address}\n")

@@ -7,9 +7,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.cycles.curves import CycleCurve, over_cycle
-from biodance.cycles.cut import Cycle, FootEvent, delay_of_nearest
+from biodance.cycles.cut import Cycle, delay_of_nearest
 from biodance.lab.c3d.subject import FileOutputs
-from biodance.records import Array, Motion
+from biodance.records import Array, FootEvent, Motion
 
 _PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
     "pelvis_tilt": ("PelvisAngles", 0),

@@ -13,7 +13,7 @@ from biodance.lab.c3d.subject import FileEvent
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
-from biodance.records import SIDES, Array, LeftOutSpan, Mask, Motion, Wrench, runs
+from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Wrench, runs
 
 # Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
 # and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
@@ -26,18 +26,6 @@ _THRESHOLD = 20.0
 the same).
 """
 _SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
-
-
-@dataclass(frozen=True)
-class FootEvent:
-    """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down,
-    False where it leaves; ``source`` "force" where a plate saw it, "markers" where the movement of the feet tells it.
-    """
-
-    time: float
-    side: str
-    down: bool
-    source: Literal["force", "markers"] = "force"
 
 
 def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
@@ -137,6 +125,15 @@ def joined_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) 
     """Return the events of both, in the order of time: the force's where a plate saw it, else the markers'."""
     kept = [event for event in markers if not abs(delay_of_nearest(force, event)) < _TOGETHER]
     return tuple(sorted((*force, *kept), key=lambda event: event.time))
+
+
+def replaced_events(found: tuple[FootEvent, ...], said: tuple[FootEvent, ...]) -> tuple[FootEvent, ...]:
+    """Return the events that were ``found``, with those that were ``said`` by hand in the place of all of their side,
+    in the order of time.
+    """
+    sides = {one.side for one in said}
+    kept = (one for one in found if one.side not in sides)
+    return tuple(sorted((*kept, *said), key=lambda event: event.time))
 
 
 def _thigh_and_shank(body: Body) -> float:

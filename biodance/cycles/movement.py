@@ -14,7 +14,6 @@ from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_c
 from biodance.cycles.cut import (
     PERCENT,
     Cycle,
-    FootEvent,
     agreement_of_events,
     foot_events,
     gait_cycles,
@@ -22,6 +21,7 @@ from biodance.cycles.cut import (
     joined_events,
     kinematic_events,
     repetitions,
+    replaced_events,
 )
 from biodance.cycles.ground import ground_curves
 from biodance.cycles.lifts import lift
@@ -31,7 +31,7 @@ from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, Mask, Motion, Sip, Trial
+from biodance.records import Array, FootEvent, Mask, Motion, Sip, Trial
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -49,7 +49,8 @@ class TrialMovement:
     trial : str
         Its name.
     events : tuple of FootEvent
-        Strikes and leavings of both feet: of the plates where they saw one, else of the markers.
+        Strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where they saw
+        one, else of the markers.
     cycles : tuple of Cycle
         Gait cycles of each foot, squats, rises from a chair.
     curves : tuple of CycleCurve
@@ -215,7 +216,7 @@ def trial_movement(
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
     if contact is not None and feet is not None:
         force = foot_events(feet, contact)
-    events = joined_events(force, markers) if markers else ()
+    events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
     found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
     cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())

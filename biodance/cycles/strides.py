@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.cut import Cycle, FootEvent, heel_and_toe
+from biodance.cycles.cut import Cycle, heel_and_toe
 from biodance.motion.soles import Soles
-from biodance.records import SIDES, Array
+from biodance.records import SIDES, Array, FootEvent
 from biodance.settings import STANDARD_GRAVITY
 
 _BELT = 0.15  # m/s of a standing foot from which the ground is a belt

@@ -4,7 +4,7 @@ large fault has small companions everywhere.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -87,8 +87,19 @@ def _session_toml(session: Session) -> str:
     for name, foot in feet.items():
         lines += ["", f"[plates.{name}]", f'foot = "{foot}"'] * bool(foot)
     for trial in session.trials:
-        lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"']
+        lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"', *_said_of(trial)]
     return "\n".join(lines) + "\n"
+
+
+def _said_of(trial: Trial) -> Iterator[str]:
+    """Yield what session.toml says of the steps of a trial: what it says of labels is done in the copy."""
+    spans = [[one.start, one.end, *([one.side] if one.side else [])] for one in trial.left_out]
+    kinds = {True: "strike", False: "off"}
+    events = [f'{{side = "{e.side}", kind = "{kinds[e.down]}", time = {e.time}}}' for e in trial.events]
+    if spans:
+        yield f"leave_out = {json.dumps(spans)}"
+    if events:
+        yield f"events = [{', '.join(events)}]"
 
 
 def with_right_labels(

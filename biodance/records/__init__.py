@@ -23,7 +23,7 @@ from biodance.records.arrays import (
 from biodance.records.attention import LeftOut
 from biodance.records.markers import Markers
 from biodance.records.motion import AngleSpan, AngleState, Motion
-from biodance.records.recording import Defect, LeftOutSpan, Source
+from biodance.records.recording import Defect, FootEvent, LeftOutSpan, Source
 from biodance.records.session import ROLES, Role, Session, Trial
 from biodance.records.subject import SIDES, FootSizes, Sip, Subject, side_in_name
 from biodance.records.wrench import Plate, Wrench
@@ -37,6 +37,7 @@ __all__ = [
     "AngleState",
     "Array",
     "Defect",
+    "FootEvent",
     "FootSizes",
     "Index",
     "LeftOut",

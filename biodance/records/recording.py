@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -67,3 +68,16 @@ class LeftOutSpan:
 
     def __str__(self) -> str:
         return f"{self.start:g} to {self.end:g} s{f' ({self.side})' if self.side else ''}"
+
+
+@dataclass(frozen=True)
+class FootEvent:
+    """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down (a
+    strike), False where it leaves (an off); ``source`` "force" where a plate saw it, "markers" where the movement of
+    the feet tells it, "hand" where session.toml says it.
+    """
+
+    time: float
+    side: str
+    down: bool
+    source: Literal["force", "markers", "hand"] = "force"

@@ -12,7 +12,7 @@ from biodance import display
 from biodance.errors import BiodanceError, TrialRefused, known_index
 from biodance.records.arrays import assign, by_name, rate_of
 from biodance.records.markers import Markers
-from biodance.records.recording import Defect, LeftOutSpan, Source
+from biodance.records.recording import Defect, FootEvent, LeftOutSpan, Source
 from biodance.records.subject import Subject
 from biodance.records.wrench import Plate, Wrench
 from biodance.settings import USUAL, Settings
@@ -55,6 +55,8 @@ class Trial:
         What was wrong in the recording and was left out.
     left_out : tuple of LeftOutSpan
         What the analyst leaves out.
+    events : tuple of FootEvent
+        Strikes and offs that the analyst set by hand, in the place of all that would be found of their foot.
 
     Examples
     --------
@@ -74,10 +76,11 @@ class Trial:
     settings: Settings = USUAL
     defects: tuple[Defect, ...] = ()
     left_out: tuple[LeftOutSpan, ...] = ()
+    events: tuple[FootEvent, ...] = ()
 
     def __post_init__(self) -> None:
         known_index("trial role", self.role, ROLES)
-        listed = ("plates", "history", "warnings", "defects", "left_out")
+        listed = ("plates", "history", "warnings", "defects", "left_out", "events")
         assign(self, **{name: tuple(getattr(self, name)) for name in listed})
         assign(self, measurements=MappingProxyType(dict(self.measurements)))
 

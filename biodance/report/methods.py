@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from biodance.display import spaced
+from biodance.records import SIDES
 from biodance.report.wording import format_number
 
 METHODS = "methods.md"
@@ -136,13 +137,23 @@ def _movement(trials: list[dict[str, Any]]) -> str:
         return ""
     steps = (
         " Foot events were taken from the force plates (20 N) where a foot stood on one alone, else from the movement "
-        "of the feet relative to the pelvis (after Zeni et al., 2008)."
+        f"of the feet relative to the pelvis (after Zeni et al., 2008).{_by_hand(trials)}"
     )
     pelvis = "; the pelvis in the lab follows Baker (2001)" if "gait" in kinds else ""
     return (
         f"Joint angles follow the ISB recommendations (Wu et al., 2002){pelvis}. Curves were normalised to 101 points "
         f"over {', '.join(found)}.{steps if 'gait' in kinds else ''}"
     )
+
+
+def _by_hand(trials: list[dict[str, Any]]) -> str:
+    feet = [
+        f"the {side} foot in {one['trial']}"
+        for one in trials
+        for side in SIDES
+        if any(event["side"] == side and event["source"] == "hand" for event in one["events"])
+    ]
+    return f" Those of {', of '.join(feet)} were set by hand." if feet else ""
 
 
 def _scaled(table: str, hip: str) -> str:

@@ -20,6 +20,51 @@ function ordered(rows) {
   return [...rows].sort((a, b) => (wanted.down ? -1 : 1) * by(a).localeCompare(by(b), undefined, { numeric: true }));
 }
 
+function folderChooser(found, page) {
+  // another folder of this machine: one level at a time
+  const place = h("div", { "aria-live": "polite" });
+  const show = async (path) => {
+    try {
+      const told = await ask("folders", { folder: path });
+      const go = (to, text) => h("button", { onclick: () => show(to), "aria-label": `Look into ${text}` }, text);
+      place.replaceChildren(
+        h("p", {}, told.folder),
+        h(
+          "div",
+          { cls: "bar" },
+          told.above ? go(told.above, "One up") : told.roots.filter((one) => one !== told.folder).map((one) => go(one, one)),
+          h("button", { cls: "main", "data-key": "open", onclick: () => openFolder(told.folder, page) }, "Open this folder"),
+        ),
+        h(
+          "div",
+          { cls: "bar" },
+          told.folders.map((one) => go(`${told.folder}/${one}`, one)),
+        ),
+      );
+    } catch (error) {
+      say(error.message);
+    }
+  };
+  return h(
+    "details",
+    { ontoggle: (event) => event.target.open && show(found.folder) },
+    h("summary", { "data-key": "folder" }, "Another folder"),
+    place,
+  );
+}
+
+export async function openFolder(path, page) {
+  // the sessions of another folder; where it holds none, this one stays
+  try {
+    say("");
+    await tell("open", { folder: path });
+    if (location.hash === "#/" || !location.hash) await page.refresh();
+    else location.hash = "#/";
+  } catch (error) {
+    say(error.message);
+  }
+}
+
 export async function showArchive(main, page) {
   Object.assign(page, { name: "", revision: "", refresh: () => showArchive(main, page) });
   document.title = "biodance";
@@ -125,6 +170,7 @@ export async function showArchive(main, page) {
         "Run those shown that are not done",
       ),
     ),
+    folderChooser(found, page),
     count,
     h(
       "table",

@@ -1,5 +1,6 @@
 // What the last run found: verdict and reasons, the pages that it drew, its files; and what acceptance would change.
 import { ask, chip, download, h, number, put, say, tell, words } from "./dom.js";
+import { openFolder } from "./archive.js";
 import { address } from "./main.js";
 import { showMarker } from "./markers.js";
 import { textEditor } from "./session.js";
@@ -175,14 +176,20 @@ function findings(rows, all) {
   );
 }
 
-function acceptance({ name }, found) {
+function acceptance({ name, page }, found) {
   // before and after first; only then can it be kept
   if (!found.findings.length) return "";
   const place = h("div", { "aria-live": "polite" });
+  let corrected = false;
   const keep = async () => {
     try {
       const { folder } = await tell("keep", { name });
-      place.replaceChildren(h("p", {}, `Kept in ${folder}. Your recordings are as they were.`));
+      place.replaceChildren(
+        h("p", {}, `Kept in ${folder}. Your recordings are as they were.`),
+        corrected
+          ? h("button", { "data-key": "corrected", onclick: () => openFolder(`${folder}/corrected`, page) }, "Open the corrected session")
+          : "",
+      );
     } catch (error) {
       say(error.message);
     }
@@ -191,6 +198,7 @@ function acceptance({ name }, found) {
     place.replaceChildren(h("p", {}, "Working out before and after …"));
     try {
       const told = await tell("accept", { name });
+      corrected = told.written.some((one) => one.file.startsWith("corrected/"));
       const head = ["Recording", "", ...CHANNELS].map((one) =>
         h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
       );

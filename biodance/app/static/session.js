@@ -18,8 +18,8 @@ const TABS = {
 const NEEDS_SESSION = ["trials", "markers", "steps"];
 
 export async function showSession(main, page, name, tab) {
-  const turn = page.turn,
-    view = await ask("session", { name });
+  const turn = page.turn;
+  let view = await ask("session", { name });
   if (turn !== page.turn) return; // somebody went on meanwhile
   document.title = `${name} · biodance`;
   Object.assign(page, { name, revision: view.revision });
@@ -29,8 +29,9 @@ export async function showSession(main, page, name, tab) {
     try {
       say("");
       const found = await tell(path, { name, revision: page.revision, ...more });
-      page.revision = found.revision;
-      await draw(found);
+      if (page.name === name) page.revision = found.revision;
+      if (turn === page.turn) await draw((view = found));
+      else if (page.name === name) await page.refresh(); // somebody went to another tab meanwhile
       return true;
     } catch (error) {
       say(error.message);

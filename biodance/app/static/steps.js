@@ -1,12 +1,13 @@
 // One recording in time: forces of the plates, foot strikes and offs of the last run, and spans that are left out.
-import { ask, h, number, put, say } from "./dom.js";
+import { ask, h, number, put, say, words } from "./dom.js";
+import { called, discard, EventEditor, isDraft, SIDES } from "./events.js";
 
-const SIDES = { left: "#b3261e", right: "#0058a3" };
 const kept = { trial: "" };
 const HIGH = 240,
   ROW = 16;
 
-export async function showSteps({ panel, view, name, edit }) {
+export async function showSteps(all) {
+  const { panel, view, name, edit } = all;
   const trials = view.trials.filter((row) => row.name);
   if (!trials.some((row) => row.name === kept.trial))
     kept.trial = (trials.find((row) => row.role !== "static") || trials[0]).name;
@@ -54,18 +55,43 @@ export async function showSteps({ panel, view, name, edit }) {
     const leave = (spans) => edit([["trials", row.stem, "leave_out"], spans.length ? spans : null]);
     const add = (a, b, side) =>
       leave([...row.leave_out, [Number(a.toFixed(3)), Number(b.toFixed(3)), ...(side in SIDES ? [side] : [])]]);
-    const line = timeLine(row, forces, moved, (a, b) => {
-      from.value = a.toFixed(3);
-      to.value = b.toFixed(3);
+    const at = h("input", { cls: "short", inputmode: "decimal", "aria-label": "Time of the event, in s" });
+    const line = h("div"),
+      chosen = h("div", { cls: "bar", "aria-live": "polite" });
+    const changes = h("div", { "aria-live": "polite" });
+    const redraw = (key) => {
+      line.replaceChildren(
+        timeLine(row, forces, editor, (a, b) => {
+          at.value = a.toFixed(3);
+          if (b - a < editor.frame) return;
+          from.value = a.toFixed(3);
+          to.value = b.toFixed(3);
+        }),
+      );
+      if (key) line.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus();
+    };
+    const editor = new EventEditor(all, row, moved, forces.ends_s, redraw);
+    line.addEventListener("focusin", () => {
+      const one = editor.events.find((other) => editor.key(other) === document.activeElement.dataset.key);
+      if (!one) return;
+      at.value = one.time_s.toFixed(3);
+      chosen.replaceChildren(
+        `Chosen: ${called(one)} at ${number(one.time_s, 3)} s. `,
+        h("button", { "data-key": "take out", onclick: () => editor.remove(one) }, "Take out"),
+      );
     });
+    redraw();
     place.replaceChildren(
       line,
       h(
         "p",
         { cls: "small" },
         "Curves: vertical force of each plate. Triangles: down a foot strikes, up it leaves; full by a plate, open by ",
-        "the markers. Red left, blue right. Grey: left out. Drag over the picture to choose a span.",
+        "the markers, with a black edge set by hand. Red left, blue right. Grey: left out. Drag a triangle to move it, ",
+        "or choose it and press an arrow key (a frame) or Delete. Drag over the picture to choose a span.",
       ),
+      chosen,
+      byHand(all, row, editor, at, draw),
       h(
         "div",
         { cls: "bar" },
@@ -101,8 +127,10 @@ export async function showSteps({ panel, view, name, edit }) {
             ),
           )
         : "",
+      changes,
       cycles(row, moved, add),
     );
+    if (moved?.cycles.some((one) => one.kind === "gait") && !view.found.fresh) await showChanges(changes, name, row);
     return undefined;
   }
   await draw();
@@ -166,7 +194,110 @@ function cycles(row, moved, add) {
   );
 }
 
-function timeLine(row, forces, moved, onspan) {
+async function showChanges(place, name, row) {
+  // the values of the last run beside those with the steps as they are set now
+  place.replaceChildren(h("p", { cls: "small" }, "Working out what these steps change …"));
+  try {
+    const { rows } = await ask("strides", { name, trial: row.name });
+    const line = (one) =>
+      h(
+        "tr",
+        {},
+        h("th", { scope: "row" }, words(one.quantity)),
+        h("td", { "data-label": "Side" }, one.side),
+        ...["before", "after"].map((when, k) =>
+          h(
+            "td",
+            { cls: "n", "data-label": ["Last run", "As set now"][k] },
+            one[when] === null ? "–" : `${number(one[when], 2)} ${one.unit}`,
+          ),
+        ),
+        h("td", { cls: "n", "data-label": "Strides now" }, `${one.count}`),
+      );
+    const head = ["Value", "Side", "Last run", "As set now", "Strides now"];
+    place.replaceChildren(
+      h("h2", {}, "What the steps as set now change"),
+      h(
+        "table",
+        { cls: "stack", "data-key": "changes" },
+        h(
+          "thead",
+          {},
+          h(
+            "tr",
+            {},
+            head.map((one) => h("th", { scope: "col" }, one)),
+          ),
+        ),
+        h("tbody", {}, rows.map(line)),
+      ),
+      h("p", { cls: "small" }, "Means, from the motion of the last run. Run again for margins, curves, moments and the report."),
+    );
+  } catch (error) {
+    place.replaceChildren(h("p", { cls: "guess-word" }, error.message));
+  }
+}
+
+function byHand({ view, name, edit }, row, editor, at, draw) {
+  // events are added, those of a foot given back to the plates and markers, and what is not written yet is said
+  const add = (side, down) => {
+    const time = Number(at.value.replace(",", "."));
+    return at.value && Number.isFinite(time)
+      ? editor.add(side, down, time)
+      : say("Give the time of the event in s, or press on the picture where it is.");
+  };
+  const sides = Object.keys(SIDES).filter((side) => row.events.some((one) => one.side === side));
+  const without = (side) => {
+    const kept = row.events.filter((one) => one.side !== side);
+    const told = kept.map((one) => ({ side: one.side, kind: one.down ? "strike" : "off", time: one.time_s }));
+    return edit([["trials", row.stem, "events"], told.length ? told : null]);
+  };
+  return h(
+    "div",
+    {},
+    h(
+      "div",
+      { cls: "bar" },
+      h("label", {}, "Add at ", at),
+      "s",
+      Object.keys(SIDES).flatMap((side) =>
+        [true, false].map((down) => {
+          const what = called({ side, down });
+          return h("button", { "data-key": `add ${what}`, onclick: () => add(side, down) }, `Add ${what}`);
+        }),
+      ),
+    ),
+    isDraft({ view, name }, row)
+      ? h(
+          "p",
+          { cls: "guess-word" },
+          "Not in session.toml yet: add what is missing, or ",
+          h(
+            "button",
+            {
+              "data-key": "discard",
+              onclick: () => {
+                discard();
+                say("");
+                draw();
+              },
+            },
+            "Discard these changes",
+          ),
+        )
+      : "",
+    sides.map((side) =>
+      h(
+        "p",
+        {},
+        `Strikes and offs of the ${side} foot are set by hand. `,
+        h("button", { "data-key": `found ${side}`, onclick: () => without(side) }, "Use those found again"),
+      ),
+    ),
+  );
+}
+
+function timeLine(row, forces, editor, onspan) {
   const wide = Math.min(1000, Math.max(340, innerWidth - 40)), // so that its letters are as large as others
     ticks = wide < 600 ? 4 : 10;
   const [begin, end] = forces.ends_s,
@@ -195,31 +326,11 @@ function timeLine(row, forces, moved, onspan) {
     );
     parts.push(h("text", { x: 6, y: 16 + 14 * k, fill: "#1b1b1b" }, one.name));
   });
-  for (const one of moved?.events || []) {
-    const at = x(one.time_s),
-      row_y = HIGH + (one.side === "left" ? ROW : 2 * ROW),
-      up = one.down ? 1 : -1;
-    parts.push(
-      h(
-        "path",
-        {
-          d: `M${at} ${row_y + 5 * up}l-5 ${-10 * up}h10z`,
-          stroke: SIDES[one.side],
-          "stroke-width": 1.5,
-          fill: one.source === "force" ? SIDES[one.side] : "#fff",
-        },
-        h(
-          "title",
-          {},
-          `${one.side} foot ${one.down ? "strikes" : "leaves"} at ${one.time_s.toFixed(3)} s, ` +
-            `by the ${one.source === "force" ? "plates" : "markers"}`,
-        ),
-      ),
-    );
+  for (const one of editor.events)
     parts.push(
       h("line", {
-        x1: at,
-        x2: at,
+        x1: x(one.time_s),
+        x2: x(one.time_s),
         y1: 0,
         y2: HIGH,
         stroke: SIDES[one.side],
@@ -227,7 +338,6 @@ function timeLine(row, forces, moved, onspan) {
         "stroke-dasharray": one.down ? null : "4 3",
       }),
     );
-  }
   for (let k = 0; k <= ticks; k++) {
     const t = begin + (k / ticks) * (end - begin);
     parts.push(h("text", { x: Math.min(x(t), wide - 34), y: HIGH + 3 * ROW + 12 }, `${t.toFixed(2)}`));
@@ -238,7 +348,7 @@ function timeLine(row, forces, moved, onspan) {
     "svg",
     {
       viewBox: `0 0 ${wide} ${HIGH + 3 * ROW + 18}`,
-      role: "img",
+      role: "group",
       "aria-label":
         `Forces and steps of ${row.name}, ${begin.toFixed(2)} to ${end.toFixed(2)} s. ` +
         "The table below lists the cycles.",
@@ -247,12 +357,15 @@ function timeLine(row, forces, moved, onspan) {
     mark,
   );
   const timeAt = (event) => {
-    const box = picture.getBoundingClientRect();
+    const box = (picture.isConnected ? picture : document.querySelector("#panel svg")).getBoundingClientRect();
     return begin + Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)) * (end - begin);
   };
+  for (const one of editor.events)
+    put(picture, editor.mark(one, x, HIGH + (one.side === "left" ? ROW : 2 * ROW), timeAt));
   let start = null;
   picture.addEventListener("pointerdown", (event) => {
     start = timeAt(event);
+    onspan(start, start);
     picture.setPointerCapture(event.pointerId);
   });
   picture.addEventListener("pointermove", (event) => {

@@ -30,7 +30,8 @@ that points up, by default z).
 ``[markers] drop = ["T10"]`` leaves markers out of every trial. In a table ``[trials.NAME]``, ``exchange = [["LKNE",
 "RKNE"], ["LANK", "RANK", 1.2, 3.4]]`` gives two labels each other's places, from 1.2 to 3.4 s or in the whole trial;
 ``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out, ``[[2.5, 3.1, "right"]]`` the cycles
-of that foot alone (`spans`).
+of that foot alone (`spans`). ``events = [{side = "left", kind = "strike", time = 1.23}, ...]`` says all strikes and
+offs of a foot, in the place of those that would be found (`foot_events`).
 
 ``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
 0.6`` what is worn there in kg, on top of ``mass_kg`` (`worn`).
@@ -55,6 +56,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.sets import parse_map
 from biodance.lab.plates.corners import Told, ToldPlate
+from biodance.lab.session.foot_events import legal_events
 from biodance.lab.session.plate_entry import PlateEntry, told_plate
 from biodance.lab.session.spans import TrialParts, legal_exchanges, legal_spans
 from biodance.lab.session.worn import legal_devices, legal_prosthesis
@@ -104,6 +106,7 @@ class _TrialEntry(_Entry):
     role: Role | None = None
     exchange: list[list[str | float]] | None = None
     leave_out: list[list[float | str]] | None = None
+    events: list[dict[str, float | str]] | None = None
 
 
 class _MarkersEntry(_Entry):
@@ -163,11 +166,14 @@ class SessionFile:
         return next((entry.role for entry in self._about(name) if entry.role), None)
 
     def parts(self, name: str) -> TrialParts:
-        """Return what is said of the parts of a trial: labels that change places, dropped markers, spans left out."""
+        """Return what is said of the parts of a trial: labels that change places, dropped markers, spans left
+        out, events of the feet.
+        """
         about = self._about(name)
         exchange = next((one.exchange for one in about if one.exchange is not None), None)
         spans = next((one.leave_out for one in about if one.leave_out is not None), None)
-        return TrialParts(legal_exchanges(exchange), self.dropped, legal_spans(spans))
+        events = next((one.events for one in about if one.events is not None), None)
+        return TrialParts(legal_exchanges(exchange), self.dropped, legal_spans(spans), legal_events(events))
 
     def _about(self, name: str) -> list[_TrialEntry]:
         """Return what is said of a trial: by its exact name, then by patterns."""
@@ -280,7 +286,8 @@ def _checked(path: Path, raw: dict[str, Any]) -> _Contents:
     try:
         _ = [told_plate(name, entry) for name, entry in found.plates.items()]
         _ = legal_prosthesis(found.subject.prosthesis), legal_devices(found.devices)
-        _ = [(legal_exchanges(one.exchange), legal_spans(one.leave_out)) for one in found.trials.values()]
+        for one in found.trials.values():
+            _ = legal_exchanges(one.exchange), legal_spans(one.leave_out), legal_events(one.events)
     except SessionRefused as error:
         raise SessionRefused(f"{path}: {error}") from None
     return found
@@ -340,5 +347,6 @@ _HELP = {
     "role": f"Legal are {', '.join(get_args(Role))}.",
     "drop": 'Write the labels, for example ["T10", "RBAK"].',
     "exchange": 'Write [["LKNE", "RKNE"]], or with from and to in s: [["LKNE", "RKNE", 1.2, 3.4]].',
+    "events": 'Write [{side = "left", kind = "strike", time = 1.23}, ...].',
     "leave_out": 'Write spans from and to in s: [[2.5, 3.1]], or of one foot: [[2.5, 3.1, "right"]].',
 }

@@ -9,7 +9,8 @@ from math import inf, isfinite
 import numpy as np
 
 from biodance.errors import SessionRefused
-from biodance.records import SIDES, Array, LeftOutSpan, Mask, Trial
+from biodance.lab.session.foot_events import with_events
+from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Trial
 from biodance.records.attention import WARNING
 
 
@@ -76,19 +77,24 @@ def _is_span(given: Sequence[str | float]) -> bool:
 
 @dataclass(frozen=True)
 class TrialParts:
-    """What is said of parts of a trial: ``exchanges`` and ``dropped`` of labels, and spans ``left_out``."""
+    """What is said of parts of a trial: ``exchanges`` and ``dropped`` of labels, spans ``left_out``, ``events`` of the
+    feet.
+    """
 
     exchanges: tuple[Exchange, ...] = ()
     dropped: tuple[str, ...] = ()
     left_out: tuple[LeftOutSpan, ...] = ()
+    events: tuple[FootEvent, ...] = ()
 
 
 def with_parts_corrected(trial: Trial, said: TrialParts) -> Trial:
     """Return a trial as the analyst says of its parts: labels exchanged, markers dropped, and the forces of the
-    spans that are left out for both feet unknown (NaN). What was done stands in the history.
+    spans that are left out for both feet unknown (NaN); with the events of the feet. What was done stands in the
+    history. TrialRefused: an event is not within the trial.
     """
     trial = _exchanged(trial, said.exchanges) if said.exchanges else trial
     trial = _without(trial, said.dropped) if said.dropped else trial
+    trial = with_events(trial, said.events) if said.events else trial
     return _left_out(trial, said.left_out) if said.left_out else trial
 
 
