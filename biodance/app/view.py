@@ -20,7 +20,7 @@ from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.plate_entry import plate_channels
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
-from biodance.records import ROLES, FootEvent, Plate, Session, Trial
+from biodance.records import ROLES, FootEvent, Markers, Plate, Session, Trial
 from biodance.report.tables.schema import plain_values
 
 
@@ -116,34 +116,32 @@ class SessionView:
         leader = min(shown, key=lambda trial: (trial.role != "static", not trial.marker_set), default=None)
         if leader is None:
             return {"set": "", "guessed": False, "labels": [], "doubts": [], "landmarks": LANDMARKS}
-        guess = guess_set(leader.markers) if leader.markers and not self._said.marker_set else None
         worn = read_marker_set(leader.marker_set) if leader.marker_set else None
-        labels = sorted({label for trial in shown if trial.markers for label in plain_labels(trial.markers.names)})
-        places = _places(worn) if worn else {}
-        named = meanings_of(labels)
-        gaps: dict[str, float] = {}
-        for trial in shown:
-            for one in report_gaps(trial.markers) if trial.markers else ():
-                gaps[one.label] = max(gaps.get(one.label, 0.0), one.percent)
-        rows = [
+        guessed = bool(worn and worn.name.startswith(GUESSED))
+        guess = guess_set(leader.markers) if leader.markers and not self._said.marker_set else None
+        return {
+            "set": worn.title if worn else "",
+            "guessed": guessed,
+            "labels": self._labels([trial.markers for trial in shown if trial.markers], worn),
+            "dropped": self._said.dropped,
+            "doubts": guess.doubts if guess and (guessed or not worn) else [],
+            "landmarks": LANDMARKS,
+        }
+
+    def _labels(self, recorded: list[Markers], worn: MarkerSet | None) -> list[dict[str, Any]]:
+        """Return every label with its place, who says so, how much of it is not seen, and in how many trials it is."""
+        labels = sorted({label for markers in recorded for label in plain_labels(markers.names)})
+        places, named, gaps = _places(worn) if worn else {}, meanings_of(labels), _gaps(recorded)
+        return [
             {
                 "label": label,
                 "place": places.get(label, ""),
                 "by": self._by(worn, label, places.get(label, ""), {one.place for one in named.get(label, ())}),
                 "gaps_percent": gaps.get(label, 0.0),
-                "trials": sum(label in trial.markers.names for trial in shown if trial.markers),
+                "trials": sum(label in markers.names for markers in recorded),
             }
             for label in labels
         ]
-        guessed = bool(worn and worn.name.startswith(GUESSED))
-        return {
-            "set": worn.title if worn else "",
-            "guessed": guessed,
-            "labels": rows,
-            "dropped": self._said.dropped,
-            "doubts": guess.doubts if guess and (guessed or not worn) else [],
-            "landmarks": LANDMARKS,
-        }
 
     def _by(self, worn: MarkerSet | None, label: str, place: str, named: set[str]) -> PlacedBy:
         if not worn or not place:
@@ -153,6 +151,14 @@ class SessionView:
         if not worn.name.startswith(GUESSED):
             return PlacedBy.SET
         return PlacedBy.NAME if place in named else PlacedBy.POSTURE
+
+
+def _gaps(recorded: list[Markers]) -> dict[str, float]:
+    """Return by label the largest share of a trial, %, in which it is not seen."""
+    found: dict[str, float] = {}
+    for one in (gap for markers in recorded for gap in report_gaps(markers)):
+        found[one.label] = max(found.get(one.label, 0.0), one.percent)
+    return found
 
 
 def _places(worn: MarkerSet) -> dict[str, str]:
