@@ -89,7 +89,7 @@ class Page:
             raise RuntimeError(answer["exceptionDetails"].get("exception", {}).get("description", "failed"))
         return answer["result"].get("value")
 
-    def until(self, condition: str, seconds: float = 60.0) -> Any:
+    def until(self, condition: str, seconds: float = 180.0) -> Any:
         """Return what a condition has become as soon as it is no longer false."""
         end = time.monotonic() + seconds
         while not (found := self.run(condition)):

@@ -151,7 +151,7 @@ def _by_hand(trials: list[dict[str, Any]]) -> str:
         f"the {side} foot in {one['trial']}"
         for one in trials
         for side in SIDES
-        if any(event["side"] == side and event["source"] == "hand" for event in one["events"])
+        if any(event["side"] == side and event["source"] == "hand" for event in one.get("events", ()))
     ]
     return f" Those of {', of '.join(feet)} were set by hand." if feet else ""
 
