@@ -17,12 +17,14 @@ from biodance.records import Subject
 PLANTED = ("numpy", "ezc3d", "random", "scipy", "pickle", "matplotlib", "mujoco", "pinocchio", "pyvista", "cvxpy")
 CHECKOUT = Path(biodance.__file__).parent.parent
 COMMANDS = {
+    "app": "no-such-folder --no-browser",
     "batch": "archive --out out-batch --workers 1 --no-pages",
     "compare": "archive/s0 archive/s1 --out out-compare",
     "dance": "--protocol one_segment --sex F --height 1.7 --mass 500 --out out-dance",
     "demo": "--out dance.npz",
     "diagnose": "archive/s0 --out out-diagnose",
     "doctor": "",
+    "effects": "",
     "export": "hoap3 --format osim --out hoap3.osim",
     "feedback": "dance.npz --out dance.html",
     "foresee": "dance.npz --out archive",
