@@ -96,7 +96,7 @@ def test_another_editor_is_noticed(browser, archive):
     browser.until("document.querySelector('#said').textContent.includes('changed elsewhere')", 15)
     browser.until("document.querySelector('legend').textContent.includes('somebody')")
     file.write_text(before, encoding="utf-8")
-    browser.until("!document.querySelector('legend').textContent.includes('somebody')", 15)
+    assert browser.until("!document.querySelector('legend').textContent.includes('somebody')", 15)
 
 
 def test_two_markers_are_exchanged_by_a_click_in_the_picture(browser, archive):
@@ -152,7 +152,7 @@ def test_a_squat_is_switched_off_and_the_next_run_leaves_it_out(browser, archive
     browser.until("document.querySelector('[data-key=run]').textContent === 'Run'")
     browser.run("document.querySelector('[data-key=run]').click()")
     browser.until("document.querySelector('[data-key=run]').textContent === 'Results are up to date'", 240)
-    browser.until(f"{rows} === {before - 1}")
+    assert browser.until(f"{rows} === {before - 1}")
 
 
 def events_of(archive: Path) -> list[dict]:
@@ -269,7 +269,7 @@ def test_tabs_are_reached_with_the_keyboard(browser):
     browser.run(
         "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
     )
-    browser.until("document.activeElement.id === 'tab-gait' && document.activeElement.ariaSelected === 'true'")
+    assert browser.until("document.activeElement.id === 'tab-gait' && document.activeElement.ariaSelected === 'true'")
 
 
 def test_nothing_is_asked_of_the_network_and_nothing_fails(browser, address):

@@ -54,3 +54,12 @@ def test_a_computed_movement_that_comes_to_rest_by_and_by_is_no_frozen_frame() -
     moved = np.linspace(0.1, 0.6, 6)[:, None] * [1.0, 0.5, 0.2]
     way = phase**3 * (10 - 15 * phase + 6 * phase**2)
     assert not frozen_frames((way[:, None, None] * moved).astype(np.float32).astype(float)).any()
+
+
+@pytest.mark.parametrize("first", [1, 2, 3, 20])
+def test_a_recording_that_hangs_from_its_first_frames_to_its_end_is_frozen(first: int) -> None:
+    """Two centimetres a frame, as somebody walks, and then not a digit more."""
+    place = np.minimum(np.arange(60), first + 1) * 0.02
+    xyz = np.zeros((60, 6, 3)) + np.arange(6.0)[:, None]
+    xyz[..., 0] += place[:, None]
+    assert frozen_frames(xyz).sum() == 60 - first - 2

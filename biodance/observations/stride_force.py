@@ -26,9 +26,9 @@ from biodance.records import Array
 _STEP, _ALONE, _HORIZONTAL = (-0.001, 0.003, 0.0045), (0.009, 0.0085, 0.008), 0.012
 """Expected error of the mass as a share of it, its sd of one step and of one person: of a whole step, of one foot
 alone; sd of the mean horizontal force over a step as a share of the weight."""
-_FLOWN, _SIDE = (0.0, 0.015, 0.04), 0.009
-"""The same of one step of a runner, from one flight to the next, and what the two feet differ in beside it: seven
-persons of two laboratories, 0.7 % beside each other where one belt carries both."""
+_FLOWN, _SIDE = (0.0, 0.015, 0.04), 0.013
+"""The same of one step of a runner, from one flight to the next, and what each foot errs by beside it: six persons of
+two laboratories, whose feet differ by 1.9 % root mean square where nothing is wrong with the plates."""
 _ON = (0.0, 0.002, 0.003)
 """The same of all strides of somebody who goes on on a belt, walking or running: nothing is trodden on beside it."""
 _MANY = 6

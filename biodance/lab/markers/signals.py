@@ -163,9 +163,9 @@ def _frozen(xyz: Array) -> Mask:
 def _breaks_off(steps: Array, start: int, stop: int) -> bool:
     """Return whether ``steps`` (T,) m a frame break off before ``start`` or set in at ``stop`` in full."""
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
-        if min(near, farther) >= 0 and max(near, farther) < steps.size:
-            slow = steps[near] < _SLOWER * steps[far] and steps[far] < steps[farther]
-            if steps[near] > _FELT and not slow:
+        if min(near, far) >= 0 and max(near, far) < steps.size:
+            slower_yet = not 0 <= farther < steps.size or steps[far] < steps[farther]
+            if steps[near] > _FELT and not (steps[near] < _SLOWER * steps[far] and slower_yet):
                 return True
     return False
 
