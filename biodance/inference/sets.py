@@ -23,6 +23,7 @@ from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
 from biodance.inference.scales import (
     CONVERGED,
+    QUIET,
     TAIL,
     ScaledFit,
     Scales,
@@ -59,7 +60,7 @@ class Search:
     columns: VisibleColumns
     Z: Array
     cuts: tuple[slice, ...]
-    least: float = 0.0
+    least: float = QUIET
 
     @classmethod
     def of(cls, rows: Rows, causes: Sequence[Candidate]) -> "Search":
