@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from accessible import ASKED, complaints, unfold
 from browser import Page
+from stream_faults import exchanged, offset, silent
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
@@ -46,40 +47,17 @@ def until(trial, seconds: float):
     return replace(trial, markers=markers)
 
 
-def on_plate(trial, change):
-    """Return the trial with the wrench of its plate changed by ``change(value, rows)`` from FAULT on."""
-    (plate,) = trial.plates
-    value = np.array(plate.wrench.value)
-    change(value, np.flatnonzero(plate.wrench.time >= FAULT))
-    return replace(trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),))
-
-
-def push(value, rows):
-    value[rows, 2] += 30.0
-
-
-def silence(value, rows):
-    value[rows] = value[rows[0] - 1]
-
-
-def exchange(trial, one, other):
-    markers, xyz = trial.markers, np.array(trial.markers.xyz)
-    i, k, rows = markers.names.index(one), markers.names.index(other), markers.time >= FAULT
-    xyz[np.ix_(rows, [i, k])] = xyz[np.ix_(rows, [k, i])]
-    return replace(trial, markers=Markers(markers.names, markers.time, xyz))
-
-
-FAULTS = {
-    ("plate_offset", "plate1:Fz"): lambda trial: on_plate(trial, push),
-    ("plate_gone", "plate1"): lambda trial: on_plate(trial, silence),
-    ("labels_swapped", "LASI/RASI"): lambda trial: exchange(trial, "LASI", "RASI"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed, fault):
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (offset, ("plate_offset", "plate1:Fz")),
+        (silent, ("plate_gone", "plate1")),
+        (exchanged, ("labels_swapped", "LASI/RASI")),
+    ],
+)
+def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed, change, fault):
     body, trial = streamed
-    session = LiveSession(body, until(FAULTS[fault](trial), FAULT + 2.0))
+    session = LiveSession(body, until(change(trial, FAULT)[0], FAULT + 2.0))
     said = [one for _ in range(session.markers.time.size) for one in session.push()]
     assert [(one.effect, one.target) for one in said] == [fault]
     assert FAULT < said[0].time_s <= FAULT + 5.0
