@@ -187,6 +187,13 @@ def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
     return tuple(out)
 
 
+def skipping(dance: Dance, p: int, before: int) -> tuple[str, ...]:
+    """Return what is called on the way to posture ``p`` straight from posture ``before``, on the same feet."""
+    now = dance.stances[p]
+    was, x = (dance.chain.plant(dance.postures[k][None], now.planted, now.ankle)[0] for k in (before, p))
+    return instructions(dance.body, was, x, now, now)
+
+
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
     """Return what the feet do between two stances; a leg that is lifted is told by its joints."""
     if was is None:

@@ -19,7 +19,7 @@ from biodance.pipeline.trial_result import Still, TrialResult
 from biodance.records import Array, Motion, side_in_name
 
 
-def _parents(body: Body) -> list[int]:
+def parent_segments(body: Body) -> list[int]:
     """Return for every segment the segment it hangs on; -1 for the root's."""
     parents = []
     for joint in body.segment_joint:
@@ -46,7 +46,7 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a
     bar joins; beyond its children, or without any, to the end of its box. Only the trunk reaches beyond its children.
     """
-    parents, place = _parents(body), pose.position
+    parents, place = parent_segments(body), pose.position
     lines: list[tuple[Array, Array, str]] = []
     for i, segment in enumerate(body.segments):
         start, children = place[:, i], [j for j, parent in enumerate(parents) if parent == i]

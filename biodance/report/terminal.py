@@ -17,7 +17,7 @@ from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
 from biodance.report.tables.diagnosis import LIMIT_ROW
-from biodance.report.tables.identification import SEGMENT_ROW
+from biodance.report.tables.identification import SEGMENT_ROW, log_in_words
 from biodance.report.tables.schema import Row, Schema, shown
 from biodance.report.tables.session import TRIAL_ROW
 from biodance.report.wording import causes_by_effect, format_number, parted_gain, sizes_in_words, trial_and_subject
@@ -162,6 +162,8 @@ def _print_performance(found: Row, console: Console) -> None:
     print_line(console, f"dance {found['dance']}, share of the table's variance removed, reached (planned):")
     for row in found["excitation"]:
         print_line(console, shown("  {segment}: {reached:%0} % ({planned:%0} %)", row))
+    for row in found["logs"]:
+        print_line(console, f"log: {log_in_words(row)}")
     for row in found["repetitions"]:
         cues = f"repeat: cue {row['transition']} to {row['transition'] + 1}"
         print_line(console, shown(cues + " (+{gain:%2} % in the mean, most in {most})", row))
