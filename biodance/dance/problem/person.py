@@ -13,8 +13,9 @@ from biodance.body.body import Body
 from biodance.body.parts import JointLimits
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
-from biodance.dance.problem.plan import LEAST_REST, Plan, finite_number, sentences, table
+from biodance.dance.problem.plan import LEAST_REST, Plan
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
+from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 from biodance.records import SIDES

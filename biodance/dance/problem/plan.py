@@ -44,7 +44,6 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
 Only [postures] is needed; everything else has the value of the paper or none.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -55,6 +54,7 @@ import numpy as np
 from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
@@ -293,26 +293,3 @@ def _limits(path: Path, raw: dict[str, Any], usual: dict[str, dict[str, float]])
         if short in raw:
             found.setdefault(name, {})[key] = finite_number(path, short, raw[short])
     return limits_with(found, where=str(path))
-
-
-def sentences(path: Path, raw: dict[str, Any]) -> tuple[str, ...]:
-    """Return what a TOML file says under ``care``; BiodanceError if it is no list of sentences."""
-    found = raw.get("care", [])
-    if not isinstance(found, list) or not all(isinstance(one, str) and one.strip() for one in found):
-        raise BiodanceError(f'{path}: care = {found!r}; expected sentences in a list, as ["A helper stands beside."].')
-    return tuple(found)
-
-
-def finite_number(path: Path, where: str, value: object) -> float:
-    """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise BiodanceError(f"{path}: {where} = {value!r}; expected a finite number.")
-    return float(value)
-
-
-def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[str, Any]:
-    """Return a table of a TOML file, empty if it is missing; BiodanceError if it is something else."""
-    value = raw.get(key, {})
-    if not isinstance(value, dict):
-        raise BiodanceError(f"{path}: [{of}{key}] must be a table, found {value!r}.")
-    return value

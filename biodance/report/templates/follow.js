@@ -93,7 +93,8 @@ function take(told) {
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
   if (why || when < 0 || !playing) return;
-  const now = moment(when), plan = planned(now.phase === "hold" ? reached(now.cue) : when), spots = (order) => follow.points.map(({ number }) => {
+  const now = moment(when), plan = planned(now.phase === "hold" ? reached(now.cue) : when);
+  const spots = (order) => follow.points.map(({ number }) => {
     const { x, y, sure: s } = points[order(number)];
     return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
   });
@@ -173,7 +174,8 @@ function grade(phase) { // after a hold: what the move that led to it and the po
   const number = cues[phase.posture].number;
   const short = shortest(phase.posture);
   by("grade").textContent = parts.some(Boolean)
-    ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.${short}` : `Posture ${number}: I did not see it.`;
+    ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.${short}`
+    : `Posture ${number}: I did not see it.`;
   draw_known();
   if (!paused && known.every((value, s) => value >= ENOUGH * goal[s])) finish();
 }
@@ -229,9 +231,9 @@ function reach(k) { // degrees of a posture as held; null when it was not seen
   return looks ? Object.fromEntries(Object.keys(looks[0]).map((name) => [name, Math.round(median(looks.map((one) =>
     one[name])))])) : null;
 }
-window.followed = { reach, angles: (when) => angles_of(joints(pose(planned(when)))), told: (k) => grades[k] ?? null, asked: (k) => asked_bends[k] ?? null, known: () => goal &&
-  Object.fromEntries(known.map((value, s) => [follow.segments[s], Math.min(100, Math.round((100 * value) / goal[s]))]))
-};
+window.followed = { reach, angles: (when) => angles_of(joints(pose(planned(when)))), told: (k) => grades[k] ?? null,
+  known: () => goal && Object.fromEntries(known.map((value, s) => [follow.segments[s],
+    Math.min(100, Math.round((100 * value) / goal[s]))])) };
 
 // ---- what to correct now, in a posture that is held ----
 const WAYS = [[2, "higher", "lower"], [1, "further to your left", "further to your right"]];

@@ -20,7 +20,8 @@ function visit() { // the log, as biodance/dance/visit_log.py reads it
     speed: Number(by("speed").value),
     postures: cues.map((cue, k) => ({
       number: cue.number, times: spent[k].times, held_s: Number(spent[k].held.toFixed(1)), skipped: left_out.has(k),
-      easier: half.has(k), told_percent: (camera && seen?.told(k)) ?? null, reached_deg: (camera && seen?.reach(k)) || null,
+      easier: half.has(k), told_percent: (camera ? seen?.told(k) : null) ?? null,
+      reached_deg: (camera && seen?.reach(k)) || null,
     })),
     known_percent: (camera && seen?.known()) || null,
   };
