@@ -307,6 +307,7 @@ function run(on) {
   if (!on) return show();
   if (second >= data.duration_s) restart();
   if (pausing === "rest") [pausing, wait] = ["back", LEAD];
+  told = ""; // said once more, aloud if asked for
   audio = audio || new AudioContext();
   stamp = performance.now();
   requestAnimationFrame(tick);
