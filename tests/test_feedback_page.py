@@ -353,7 +353,7 @@ def test_the_page_rests_shows_first_and_speaks_only_when_asked_by_a_voice_of_thi
     browser.run(own + "second = cues[1].hold_s - 0.05")
     browser.until("wait > 0 && spoken.length")
     assert browser.run("spoken.at(-1)") == " ".join(["Stand still. Next:", *cue["calls"]]).replace("°", " degrees")
-    assert 0 < browser.run("wait") <= (cue["hold_s"] - cue["move_s"]) / 0.5 + 0.5 - 1.0, "as long as the slow motion lasts"
+    assert 0 < browser.run("wait") <= 2 * (cue["hold_s"] - cue["move_s"]) - 0.5, "as long as the slow motion lasts"
     browser.run(f"wait = 0; second = {cue['move_s']} - 0.05")
     browser.until("!playing")
     assert browser.run("[by('now').textContent, pausing]") == ["Rest. Let the arms down", "rest"]
