@@ -238,7 +238,8 @@ def test_swinging_arms_are_no_exchanged_hands_and_accepting_writes_no_label(chil
 
 def test_accepting_writes_what_it_says_and_nothing_else(data: Path, tmp_path: Path) -> None:
     session = read_session(data / "biomechzoo/HC055A")
-    right = with_right_labels(examine(session), tell=lambda text: None)
+    result = examine(session)
+    right = with_right_labels(result, recorded_of(result), tell=lambda text: None)
     assert {name: set(pairs) for name, pairs in right.exchanged.items()} == {"HC055A34": set(map(sorted_pair, HEAD))}
     written, refused = write_mended(session, right, tmp_path)
     assert [one.file for one in written] == ["mended/HC055A34.c3d"]
