@@ -178,7 +178,9 @@ def with_faults_undone(
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        result = examine(replace(result.session, trials=trials), reference=reference, known=result.known)
+        result = examine(
+            replace(result.session, trials=trials), reference=reference, known=result.known, earlier=result
+        )
         recorded = recorded_of(result)
     if not found:
         return mended, recorded
