@@ -5,13 +5,17 @@ from dataclasses import replace
 from functools import partial
 from itertools import repeat
 
+import numpy as np
+
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
+from biodance.identification.limbs import with_declared_limbs
 from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.corrections import PlateCorrection, corrected_trial
+from biodance.motion.contact import carried_elsewhere
 from biodance.motion.quiet_standing import QuietStanding
-from biodance.pipeline.body import refuse_another_reference, with_forces
+from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh, with_weighed_mass
 from biodance.pipeline.identification import (
     FITTED_ROLES,
@@ -21,12 +25,12 @@ from biodance.pipeline.identification import (
     identify_trials,
     predicted,
 )
-from biodance.pipeline.placed import place
+from biodance.pipeline.placed import Placed
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import Step, Still, TrialResult
-from biodance.records import Motion, Session
+from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
+from biodance.records import Mask, Motion, Session
 from biodance.threads import one_thread
 
 
@@ -66,6 +70,59 @@ def _examined(
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
     return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
+
+
+def _placed(
+    session: Session,
+    read: tuple[TrialResult, ...],
+    known: Body | None,
+    earlier: tuple[Placed, tuple[TrialResult, ...]] | None,
+) -> Placed:
+    """Return who moves in the prepared trials ``read`` of a session; the body of an ``earlier`` examination where its
+    trials have the same markers, and nothing else carries in other frames.
+
+    Raises
+    ------
+    SessionRefused
+        The ``known`` body is of another person.
+    """
+    subject = session.subject
+    hidden = tuple(_hidden(one, subject.mass) for one in read)
+    if earlier is not None and earlier[0].holds((subject, known, hidden)) and _same_markers(read, earlier[1]):
+        return earlier[0]
+    steps: list[Step] = []
+    body, source = body_of(subject, read, session.settings, steps)
+    prior = None
+    if body is not None and known is not None:
+        body, prior, source = starting_from(known, body, subject.mass, source)
+    elif body is not None:
+        body, limbs = with_declared_limbs(body, subject)
+        source = f"{source} {limbs}".strip()
+    plain, shown = body, ShownJoints()
+    if body is not None:
+        body, shown = shown_joints(body, read, steps)
+    return Placed(subject, known, hidden, body, plain, source, prior, shown, tuple(steps))
+
+
+def _hidden(one: TrialResult, mass: float) -> Mask:
+    trial = one.trial
+    if not one.usable or trial.markers is None or not trial.plates:
+        return np.zeros(0, dtype=bool)
+    return carried_elsewhere(trial, weight=trial.settings.gravity * mass)
+
+
+def _same_markers(some: tuple[TrialResult, ...], others: tuple[TrialResult, ...]) -> bool:
+    """Return whether the trials of two examinations have equal markers."""
+    for one, other in zip(some, others, strict=True):
+        ours, theirs = one.trial.markers, other.trial.markers
+        if ours is None or theirs is None:
+            if ours is not theirs:
+                return False
+        elif ours.names != theirs.names or not all(
+            np.array_equal(*pair, equal_nan=True) for pair in ((ours.time, theirs.time), (ours.xyz, theirs.xyz))
+        ):
+            return False
+    return True
 
 
 @one_thread()
@@ -130,7 +187,7 @@ def examine(
     read = _prepared(session, tell)
     tell("scaling the body")
     before = earlier.placed if earlier is not None else None
-    placed = place(session, read, known, (before, earlier.trials) if before and earlier else None)
+    placed = _placed(session, read, known, (before, earlier.trials) if before and earlier else None)
     body, prior, shown = placed.body, placed.prior, placed.shown
     if body is not None and reference is not None:
         refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)

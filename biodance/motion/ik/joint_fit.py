@@ -195,8 +195,10 @@ def beside_sliding_skin(
     markers = at.left_open(_places(body, at.pose, kept))
     angles = (found.q[found.solved] - stand)[:, body.nq - len(body.joints) :]
     beside = np.repeat(neighbours(body)[:, list(body.markers.segment)][:, kept] > 0, 3, axis=1)
-    rows = np.concatenate([markers, joints, at.residual[..., None]], axis=2)
-    every, shared, own = _beside_slides(rows, angles, beside)
+    parts = [markers[:, :, near] * angle[:, None, None] for near, angle in zip(beside, angles.T, strict=True)]
+    slides = np.concatenate(parts, axis=2).reshape(markers.shape[0] * markers.shape[1], -1)
+    rows = np.concatenate([markers, joints, at.residual[..., None]], axis=2).reshape(len(slides), -1)
+    every, shared, own = rows.T @ rows, slides.T @ rows, slides.T @ slides
     left = _without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
     square = _without_slides(every, shared, own, float(left) * alike)
     each, place = 3 * len(kept), np.arange(3 * len(kept)).reshape(-1, 3)
@@ -206,23 +208,6 @@ def beside_sliding_skin(
     names = tuple(body.markers.names[marker] for marker in kept)
     inside = square[place[:, :, None], place[:, None, :]]
     return cost, MarkerSlopes(names, square[place, -1], inside, square[:each, of_joints].reshape(-1, 3, SIZE))
-
-
-def _beside_slides(rows: Array, angles: Array, beside: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
-    """Return the products (p, p) of the ``rows`` (T, r, p) of all postures, (s, p) of slides and rows, and (s, s) of
-    slides. A slide goes with one of the ``angles`` (T, J) along one of the first columns, those ``beside`` (J, m) it:
-    its products are those of the columns in each posture, times the angle.
-    """
-    markers = np.swapaxes(rows[:, :, : beside.shape[1]], 1, 2)
-    square = markers @ rows
-    which, column = np.nonzero(beside)
-    shared = np.tensordot(angles, square, ([0], [0]))[which, column]
-    own = np.empty((len(which), len(which)))
-    for angle, near in enumerate(beside):
-        both = np.tensordot(angles * angles[:, angle, None], square[:, near, : beside.shape[1]], ([0], [0]))
-        own[which == angle] = both[which, :, column].T
-    flat = rows.reshape(-1, rows.shape[2])
-    return flat.T @ flat, shared, own
 
 
 def _without_slides(square: Array, shared: Array, own: Array, noise: float) -> Array:
