@@ -109,8 +109,6 @@ class Rows:
 
     def added(self, effect: Effect, theta: Array) -> Array:
         """Return (r,): what a cause of size ``theta`` (p,) adds to the whitened rows."""
-        if effect.linear:
-            return np.asarray(self.slopes(effect, theta) @ theta)
         simulated = np.zeros(0)
         if self.problem is not None:
             simulated = self.white(removed(self.problem, effect, theta)[:, None])[:, 0]
