@@ -21,7 +21,7 @@ FACTORS, BAR = (0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.4), (0.93, 0.9
 PARTS = {"mass": [0], "CoM": [1, 2, 3]}
 
 
-def held(z: Array, factor: float) -> Array:
+def held(z: Array, factor: float = 1.0) -> Array:
     """Return the share (people,) of values that intervals ``factor`` times as wide hold, of ``z`` (people, ...)."""
     return np.mean(np.abs(z) <= factor * SIGMAS, axis=tuple(range(1, z.ndim)))
 

@@ -8,68 +8,19 @@ on Fz of the plate that then bears most, the same plate falls silent, LASI and R
 """
 
 import argparse
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from stream_faults import FAULTS
 
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.pipeline.stream import body_and_stream, replay
-from biodance.records import Array, Markers, Trial, Wrench
 
 HEADING = (
     "| recording | s | Hz | ms a frame: median, 99 %, most | end against batch, largest difference "
     "| +30 N | plate silent | pelvis exchanged | knee's marker 120 mm off | other names |\n|" + "---|" * 10
 )
-
-
-def _of_plate(trial: Trial, at: float, change: Callable[[Array, int], None]) -> tuple[Trial, str]:
-    """Return the trial with one plate changed from ``at`` s on: that which bears most in the second after it."""
-    load = [p.wrench.value[(p.wrench.time >= at) & (p.wrench.time < at + 1), 2].sum() for p in trial.plates]
-    plate = trial.plates[int(np.argmax(load))]
-    value = np.array(plate.wrench.value)
-    change(value, int(np.searchsorted(plate.wrench.time, at)))
-    changed = replace(plate, wrench=Wrench(plate.wrench.time, value))
-    return replace(trial, plates=tuple(changed if p is plate else p for p in trial.plates)), plate.name
-
-
-def _offset(trial: Trial, at: float) -> tuple[Trial, str, str]:
-    def push(value: Array, row: int) -> None:
-        value[row:, 2] += 30.0
-
-    return *_of_plate(trial, at, push), "plate_offset"
-
-
-def _silent(trial: Trial, at: float) -> tuple[Trial, str, str]:
-    def silence(value: Array, row: int) -> None:
-        value[row:] = value[row - 1]
-
-    return *_of_plate(trial, at, silence), "plate_gone"
-
-
-def _with_markers(trial: Trial, xyz: Array) -> Trial:
-    assert trial.markers is not None
-    return replace(trial, markers=Markers(trial.markers.names, trial.markers.time, xyz))
-
-
-def _exchanged(trial: Trial, at: float) -> tuple[Trial, str, str]:
-    assert trial.markers is not None
-    xyz, rows = np.array(trial.markers.xyz), trial.markers.time >= at
-    left, right = (trial.markers.names.index(name) for name in ("LASI", "RASI"))
-    xyz[rows, left], xyz[rows, right] = trial.markers.xyz[rows, right], trial.markers.xyz[rows, left]
-    return _with_markers(trial, xyz), "LASI/RASI", "labels_swapped"
-
-
-def _moved(trial: Trial, at: float) -> tuple[Trial, str, str]:
-    assert trial.markers is not None
-    xyz, rows = np.array(trial.markers.xyz), trial.markers.time >= at
-    xyz[rows, trial.markers.names.index("LKNE"), 2] -= 0.12
-    return _with_markers(trial, xyz), "LKNE", "marker_misplaced"
-
-
-FAULTS = (_offset, _silent, _exchanged, _moved)
 
 
 def row(file: Path) -> str:

@@ -23,7 +23,7 @@ import numpy as np
 import biodance
 from benchmarks.people import first_seed, session_of
 from biodance.lab.c3d.write import write_c3d
-from biodance.records import Markers, Plate, Subject
+from biodance.records import Markers, Plate
 
 WALKS = "30A05 30A22 31A06 31A23 32A03 32A18 38A11 38A27 44A15 44A29 50A11 50A33 55A09 55A34"
 REAL = (*(f"biomechzoo/HC0{n[:3]}/HC0{n}" for n in WALKS.split()), "adl_gait/2014001_C1_01", "pycgm/Movement_trial")
@@ -127,18 +127,11 @@ def measured(one: Cut, forces: Path) -> dict[str, Any]:
     }
 
 
-def simulated(number: int, seed: int, work: Path) -> list[Path]:
-    """Return the recordings of a person of the own laboratory, squats or a short dance."""
-    protocol, sex = ("squat", "short")[number % 2], "FM"[number // 2 % 2]
-    subject = Subject(55.0 + 3.0 * number, 1.60 + 0.02 * number, sex, 25.0 + number)
-    folder = biodance.simulate(subject, protocol, work / f"own{seed}", seed=seed)
-    return [path for path in sorted(folder.glob("*.c3d")) if path.stem != "static"]
-
-
 def sources(asked: argparse.Namespace, work: Path) -> Iterator[tuple[Path, str]]:
     """Yield every recording and its laboratory."""
     for number in range(asked.own):
-        yield from ((path, "own") for path in simulated(number, asked.first + number, work))
+        place = session_of("own", asked.first + number, work, ("squat", "short")[number // 2 % 2])
+        yield from ((path, "own") for path in sorted(place.glob("*.c3d")) if path.stem != "static")
     for number in range(asked.foreign):
         place = session_of("foreign", asked.first + number, work)
         for name in (f"dance0{1 + number % 6}", f"squat0{1 + number % 2}"):

@@ -10,8 +10,7 @@ The robot plays its dance by its joints alone, free on a floor with friction, as
 (Froude), whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than
 the URDF. Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring,
 damper and the drawing's torque), `ankle=200` the pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1`
-N·m in every joint, `friction=0.3` under the feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad,
-`gain.Fz=0.95`.
+N·m in every joint, `friction=0.3` under the feet.
 """
 
 import json
@@ -31,7 +30,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
 from biodance.dance.robot import person_sized, shrunk
 from biodance.motion.dynamics import predict_wrench
-from biodance.records import CHANNELS, Array, Sip
+from biodance.records import Array, Sip
 from biodance.spatial import point_mass
 
 FEET = ("right_foot", "left_foot")
@@ -41,7 +40,6 @@ COVERS = {
     "left_shank": (0.05, (0.5, 0.5, 0.7)),
 }  # fmt: skip
 """kg taken off a link, and where in its box (shares of its sides)."""
-PHYSICAL = ("pid", "ankle", "stiction", "friction")
 INTEGRAL = 0.3
 """s: integral time of the motors, in the likeness."""
 EVERY = 8
@@ -124,20 +122,11 @@ def simulate(dance: Dance, truth: Body, hold: float, troubles: dict[str, float])
     return time / to.time, q, applied / (to.mass * to.length), wrench / units
 
 
-def hidden(body: Body, troubles: dict[str, float], angle: Array, torque: Array, wrench: Array) -> tuple[Array, Array]:
-    """Return what encoders (T, n) and plate (T, 6) show of true angles, torques and wrench."""
-    names = [joint.name for joint in body.joints]
-    angle, wrench = np.array(angle), np.array(wrench)
+def encoded(body: Body, troubles: dict[str, float], angle: Array, torque: Array) -> Array:
+    """Return what encoders (T, n) show of true angles and torques."""
+    angle = np.array(angle)
     angle[:, ankles(body)] += torque[:, ankles(body)] / troubles.get("ankle", np.inf)
-    for key, value in troubles.items():
-        kind, _, where = key.partition(".")
-        if kind == "zero":
-            angle[:, names.index(where)] += value
-        if kind == "play":
-            angle[:, names.index(where)] += value / 2 * np.sign(torque[:, names.index(where)])
-        if kind == "gain":
-            wrench[:, CHANNELS.index(where)] *= value
-    return angle, wrench
+    return angle
 
 
 def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
@@ -145,15 +134,15 @@ def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
     folder, drawn = Path(out), read_urdf(urdf, feet=FEET)
     troubles = {key: float(value) for key, value in (word.split("=") for word in words)}
     truth = bare(drawn)
-    physical = "_".join(f"{key}{value:g}" for key, value in sorted(troubles.items()) if key in PHYSICAL)
+    physical = "_".join(f"{key}{value:g}" for key, value in sorted(troubles.items()))
     for k, (name, source) in enumerate((("dance", fit), ("unseen", unseen))):
         dance = Dance.load(Path(source) / "dance.npz")
         cache = Path(source) / f"played_{physical}.npz"
         if not cache.exists():
             played = simulate(dance, replace(dance.body, sip=standing_frames(truth).sip), 1.0, troubles)
             np.savez(cache, *played)
-        time, *true = np.load(cache).values()
-        angle, wrench = hidden(drawn, troubles, *true)
+        time, angle, torque, wrench = np.load(cache).values()
+        angle = encoded(drawn, troubles, angle, torque)
         lab = RobotLab(ahead=0.37 + k, place=(0.03 - 0.05 * k, -0.02), yaw=0.1 - 0.3 * k)
         write_robot_trial(folder / name, tuple(j.name for j in drawn.joints), time, angle, wrench, lab=lab, seed=k)
         print(f"{name}: {time[-1]:.1f} s, stayed up")

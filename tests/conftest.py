@@ -1,14 +1,25 @@
 """What every test may count on: the front door is loaded before a test replaces a function that it imports, which it
-would keep; the folder with real recordings.
+would keep; one thread of linear algebra; the folder with real recordings.
 """
 
 import os
 import tomllib
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 
 import biodance.pipeline.front  # noqa: F401
+from biodance.threads import one_thread
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol() -> Generator[None, object, object]:
+    """Run every test with its fixtures as the stages of the package run: with one thread. A second one, beside which
+    another worker of pytest computes, cost up to seventy times the processor time.
+    """
+    with one_thread():
+        return (yield)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 """Small cases on which every effect is tried, and what the docstring of an effect must say."""
 
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Plate, Session, Source, Subject, Trial, Wrench
 
 
+@cache
 def example(plates: int = 1) -> Case:
     """Return a smooth trial of a random tree on one or two plates."""
     rng = np.random.default_rng(0)
@@ -45,4 +48,17 @@ def session_of(*cases: Case) -> Recorded:
     return Recorded(Session(Subject(70.0, 1.75, "M"), trials, Path()), cases)
 
 
-CASES = {1: example(1), 2: example(2), "human": human_case(120)}
+class Cases(Mapping[int | str, Case]):
+    """The cases by number of plates, and the human's: each is made when it is asked for, as that one is tracked."""
+
+    def __getitem__(self, which: int | str) -> Case:
+        return human_case(120) if which == "human" else example(int(which))
+
+    def __iter__(self) -> Iterator[int | str]:
+        return iter((1, 2, "human"))
+
+    def __len__(self) -> int:
+        return 3
+
+
+CASES = Cases()

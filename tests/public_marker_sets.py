@@ -5,6 +5,7 @@ them; a subject's name before the labels and unlabelled points are added as real
 """
 
 import zlib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,7 @@ class Person:
         self.right = across / self.width
         self.ahead = np.cross([0.0, 0.0, 1.0], self.right)
 
+    @cache  # noqa: B019 - nine persons, as long as the tests run
     def landmark(self, side: str, place: str) -> Array:
         """Return the path of a landmark, (T, 3) m; what this person lacks is put beside what there is."""
         found = landmark_path(self.markers, self.worn, place, side)
@@ -170,6 +172,7 @@ def people_of(data: Path) -> dict[str, Person]:
     return {file.stem: Person(read_trial(file)) for file in files}
 
 
+@cache
 def labelled(person: Person, name: str, still: Person | None = None) -> tuple[Markers, dict[str, str]]:
     """Return the recording under the labels of a set, and label -> what it may be; what was not recorded rides on its
     segment as the ``still`` person got it.

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from shutil import copytree
+from shutil import copy
 
 import pytest
 
@@ -18,7 +18,9 @@ TRIAL = "HC030A05"
 @pytest.fixture(scope="module")
 def place(data: Path, tmp_path_factory: pytest.TempPathFactory) -> SessionPlace:
     folder = tmp_path_factory.mktemp("steps")
-    copytree(data / "biomechzoo" / "HC030A", folder / "archive" / "HC030A")
+    (folder / "archive" / "HC030A").mkdir(parents=True)
+    for name in ("HC030A01", TRIAL):
+        copy(data / "biomechzoo" / "HC030A" / f"{name}.c3d", folder / "archive" / "HC030A")
     archive = Archive(folder / "archive", folder / "results")
     process_session(archive["HC030A"].task())
     return archive["HC030A"]

@@ -94,6 +94,12 @@ def modules() -> dict[str, ast.Module]:
     return {module_name(path): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+@cache
+def walked(tree: ast.AST) -> tuple[ast.AST, ...]:
+    """All nodes of a module or of a part of it."""
+    return tuple(ast.walk(tree))
+
+
 def public_names(tree: ast.Module) -> set[str]:
     """Functions, classes and constants without underscore that a module defines itself."""
     found = set()
@@ -120,7 +126,7 @@ def imports(trees: Mapping[str, ast.Module]) -> dict[str, set[str]]:
     graph: dict[str, set[str]] = {}
     for module, tree in trees.items():
         wanted: set[str] = set()
-        for node in ast.walk(tree):
+        for node in walked(tree):
             if isinstance(node, ast.Import):
                 wanted |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
@@ -191,7 +197,7 @@ def folders(trees: Iterable[str]) -> list[str]:
 def bodies(tree: ast.Module) -> list[tuple[str, int]]:
     """Name and length in lines of every function's body, its docstring not counted."""
     found = []
-    for node in ast.walk(tree):
+    for node in walked(tree):
         if isinstance(node, ast.FunctionDef):
             lines = node.body[1:] if ast.get_docstring(node) is not None else node.body
             found.append((node.name, lines[-1].end_lineno - lines[0].lineno + 1 if lines else 0))
@@ -205,12 +211,17 @@ def complexity(function: ast.FunctionDef) -> int:
     """McCabe's number as radon counts it: one more than the decisions, those inside expressions included, which ruff's
     C901 leaves out; a function inside counts for itself.
     """
-    inside = [node for node in ast.walk(function) if isinstance(node, ast.FunctionDef) and node is not function]
-    nodes = set(ast.walk(function)).difference(*map(ast.walk, inside))
+    inside = [node for node in walked(function) if isinstance(node, ast.FunctionDef) and node is not function]
+    nodes = set(walked(function)).difference(*map(walked, inside))
     joined = sum(len(node.values) - 1 for node in nodes if isinstance(node, ast.BoolOp))
     filtered = sum(len(node.ifs) for node in nodes if isinstance(node, ast.comprehension))
     last = sum(bool(node.orelse) for node in nodes if isinstance(node, ast.For | ast.While | ast.Try))
     return 1 + sum(isinstance(node, DECISIONS) for node in nodes) + joined + filtered + last
+
+
+@cache
+def graph_of_the_package() -> Graph:
+    return imports(modules())
 
 
 def test_a_public_name_has_one_meaning() -> None:
@@ -221,11 +232,11 @@ def test_a_public_name_has_one_meaning() -> None:
 
 def test_nothing_is_imported_in_a_circle() -> None:
     """The front door names what lives inside for type checkers only; nothing inside imports it."""
-    assert circles(imports(modules())) == []
+    assert circles(graph_of_the_package()) == []
 
 
 def test_a_folder_has_few_floors() -> None:
-    graph = imports(modules())
+    graph = graph_of_the_package()
     high = {folder: count for folder in folders(graph) if (count := floors(graph, folder)) > FLOORS}
     assert high == {}, f"More than {FLOORS} floors: cut the folder into folders, or the chain of imports shorter."
 
@@ -246,7 +257,7 @@ def test_a_function_takes_few_decisions() -> None:
     functions = [
         (complexity(node), f"{module}.{node.name}")
         for module, tree in modules().items()
-        for node in ast.walk(tree)
+        for node in walked(tree)
         if isinstance(node, ast.FunctionDef)
     ]
     over = [one for one in functions if one[0] > COMPLEXITY]
@@ -325,7 +336,7 @@ def naming_effects(trees: Mapping[str, ast.Module], names: set[str]) -> set[str]
     return {
         module
         for module, tree in trees.items()
-        for node in ast.walk(tree)
+        for node in walked(tree)
         if isinstance(node, ast.Constant) and node.value in names
     }
 
@@ -342,7 +353,7 @@ def keyed_by_effects(trees: Mapping[str, ast.Module], names: set[str], members: 
 
     found = []
     for module, tree in trees.items():
-        for node in ast.walk(tree):
+        for node in walked(tree):
             items = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
             if sum(map(is_effect, items)) > 1:
                 found.append(f"{module}:{node.lineno}")

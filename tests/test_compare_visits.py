@@ -4,6 +4,7 @@ is refused in a sentence.
 
 import json
 import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,10 +21,11 @@ from biodance.cycles.keys import key_values, leading_foot, stride_values
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import Stride
 from biodance.errors import SessionRefused
+from biodance.pipeline import visits as pipeline
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.visit_quantities import Untested, cycle_quantities
-from biodance.pipeline.visits import VisitComparison, compare_visits, read_visits
-from biodance.records import Subject
+from biodance.pipeline.visits import ExaminedVisit, VisitComparison, compare_visits, read_visits
+from biodance.records import Session, Subject
 from biodance.report.visits import comparison_sentence, write_visits
 from biodance.uncertainty.visits import KeyKind, beyond_chance, change_of_mean, placement_sd, visit_mean
 from biodance.virtual_lab.movement.protocol import read_protocol
@@ -60,6 +62,23 @@ def simulated(out: Path, *, day: int, speed: float = SPEED, mass: float = 62.0, 
 
     subject = Subject(mass, 1.70, "F", 31.0)
     return write_visit(subject, read_protocol(plan), out, performed, seed=seed, visit=LabVisit(day))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _each_visit_is_examined_once() -> Iterator[None]:
+    """Let every comparison of this file, the command's too, have what the first one found in a visit."""
+    known: dict[tuple[Path, str], ExaminedVisit] = {}
+    examined = pipeline._examined
+
+    def once(session: Session, name: str, tell: Callable[[str], None]) -> ExaminedVisit:
+        key = (session.folder, name)
+        if key not in known:
+            known[key] = examined(session, name, tell)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "_examined", once)
+        yield
 
 
 @pytest.fixture(scope="module")

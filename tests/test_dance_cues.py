@@ -1,15 +1,18 @@
 """Cue sheet: only what moves, pairs together, planted legs by their knees, in words."""
 
+from dataclasses import replace
+
 import numpy as np
+from small_dances import small_dance
 
 from biodance.body.human.human import human
-from biodance.dance.cues import _MOST, _words, calls, cue_sheet, instructions
+from biodance.dance.cues import _MOST, REST, _words, calls, cue_sheet, instructions, rests
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F"))
-REST = np.zeros(23)
+STRAIGHT = np.zeros(23)
 
 
 def posture(**degrees: float) -> Array:
@@ -25,36 +28,38 @@ def test_every_joint_of_the_human_has_words() -> None:
 
 
 def test_direction_size_and_order() -> None:
-    said = calls(BODY, REST, posture(right_shoulder_flexion=88, trunk_rotation=-31, left_elbow_flexion=5))
-    assert said == ("raise the right arm forward to a right angle", "turn the trunk to the right by about 30°")
+    said = calls(BODY, STRAIGHT, posture(right_shoulder_flexion=88, trunk_rotation=-31, left_elbow_flexion=5))
+    assert said == ("lift the right arm forward to shoulder height", "turn the trunk to the right by about 30°")
 
 
 def test_pairs_are_called_together_and_only_when_alike() -> None:
-    assert calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=64)) == (
+    assert calls(BODY, STRAIGHT, posture(right_elbow_flexion=60, left_elbow_flexion=64)) == (
         "bend both elbows by about 60°",
     )
-    assert len(calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=100))) == 2
+    assert len(calls(BODY, STRAIGHT, posture(right_elbow_flexion=60, left_elbow_flexion=100))) == 2
 
 
 def test_going_back_is_said_as_the_place_not_as_zero() -> None:
-    assert calls(BODY, posture(trunk_flexion=40), REST) == ("bring the trunk upright",)
+    assert calls(BODY, posture(trunk_flexion=40), STRAIGHT) == ("bring the trunk upright",)
 
 
 def test_coming_up_half_way_is_not_said_as_going_down() -> None:
     squat, half = (posture(right_knee_flexion=angle, left_knee_flexion=angle) for angle in (45.0, 15.0))
-    assert calls(BODY, squat, half) == ("bend both knees only by about 15°",)
+    assert calls(BODY, squat, half) == ("straighten both knees, all but about 15°",)
+    deeper = posture(right_knee_flexion=90, left_knee_flexion=90)
+    assert calls(BODY, deeper, squat) == ("bend both knees only by about 45°",)
     assert calls(BODY, half, squat) == ("bend both knees by about 45°",)
 
 
 def test_of_a_standing_leg_only_the_knee_is_called() -> None:
     squat = posture(right_knee_flexion=45, right_hip_flexion=40, right_ankle_dorsiflexion=20)
-    assert calls(BODY, REST, squat, ("right", "left")) == ("bend the right knee by about 45°",)
-    assert len(calls(BODY, REST, squat, ("left",))) == 3
+    assert calls(BODY, STRAIGHT, squat, ("right", "left")) == ("bend the right knee by about 45°",)
+    assert len(calls(BODY, STRAIGHT, squat, ("left",))) == 3
 
 
 def test_a_planted_leg_is_never_half_of_a_pair() -> None:
     both = posture(right_hip_rotation=-45, left_hip_rotation=-45)
-    assert calls(BODY, REST, both, ("right",)) == ("turn the left leg outwards by about 45°",)
+    assert calls(BODY, STRAIGHT, both, ("right",)) == ("turn the left leg outwards by about 45°",)
 
 
 HIPS = np.zeros(3)
@@ -63,26 +68,28 @@ FEET = ("right", "left")
 
 def test_hips_that_go_with_the_trunk_are_one_call_and_alone_another() -> None:
     twist = posture(trunk_rotation=-30)
-    assert calls(BODY, REST, twist, FEET, (HIPS, np.array([-28.0, 0, 0]))) == (
+    assert calls(BODY, STRAIGHT, twist, FEET, (HIPS, np.array([-28.0, 0, 0]))) == (
         "turn the trunk to the right by about 30°, hips too",
     )
-    assert calls(BODY, REST, twist, FEET, (HIPS, np.array([28.0, 0, 0]))) == (
+    assert calls(BODY, STRAIGHT, twist, FEET, (HIPS, np.array([28.0, 0, 0]))) == (
         "turn the trunk to the right by about 30°",
         "turn the hips to the left by about 30°",
     )
-    assert calls(BODY, REST, REST, FEET, (HIPS, np.array([0, 0, 40.0]))) == ("bow forward from the hips by about 45°",)
+    assert calls(BODY, STRAIGHT, STRAIGHT, FEET, (HIPS, np.array([0, 0, 40.0]))) == (
+        "bow forward from the hips by about 45°",
+    )
     low = np.array([0.0, 0.0, 60.0])
-    assert calls(BODY, REST, posture(trunk_flexion=30), FEET, (HIPS, low)) == (
+    assert calls(BODY, STRAIGHT, posture(trunk_flexion=30), FEET, (HIPS, low)) == (
         "lean the trunk forward by about 30°, hips too, by about 60°",
     )
-    assert calls(BODY, posture(trunk_flexion=30), REST, FEET, (low, HIPS)) == ("bring the trunk upright, hips too",)
+    assert calls(BODY, posture(trunk_flexion=30), STRAIGHT, FEET, (low, HIPS)) == ("bring the trunk upright, hips too",)
 
 
 def test_hips_that_lean_with_bending_knees_are_not_called() -> None:
     squat, tilt = posture(right_knee_flexion=50, left_knee_flexion=50), np.array([0.0, 0.0, 25.0])
-    assert calls(BODY, REST, squat, FEET, (HIPS, tilt)) == ("bend both knees by about 45°",)
-    assert len(calls(BODY, REST, squat, FEET, (HIPS, 2 * tilt))) == 2
-    assert len(calls(BODY, REST, squat, (), (HIPS, tilt))) == 2, "legs that hang hold nobody up"
+    assert calls(BODY, STRAIGHT, squat, FEET, (HIPS, tilt)) == ("bend both knees by about 45°",)
+    assert len(calls(BODY, STRAIGHT, squat, FEET, (HIPS, 2 * tilt))) == 2
+    assert len(calls(BODY, STRAIGHT, squat, (), (HIPS, tilt))) == 2, "legs that hang hold nobody up"
 
 
 def test_the_hips_of_a_dance_are_called_by_their_sides() -> None:
@@ -98,16 +105,26 @@ def test_the_hips_of_a_dance_are_called_by_their_sides() -> None:
 
 def test_what_is_more_than_a_person_can_begin_at_once_is_said_after() -> None:
     moved = posture(**{joint.name: 20.0 + i for i, joint in enumerate(BODY.joints)})
-    text = cue_sheet((calls(BODY, REST, moved),), ("free",))
+    text = cue_sheet((calls(BODY, STRAIGHT, moved),), ("free",))
     first, rest = text.split("**1.** ")[1].split(" And also: ")
     assert len(first.split(";")) == _MOST
-    assert len(first.split(";")) + len(rest.split(";")) == len(calls(BODY, REST, moved)) >= 13
+    assert len(first.split(";")) + len(rest.split(";")) == len(calls(BODY, STRAIGHT, moved)) >= 13
 
 
 def test_sheet_counts_postures_and_names_each_stance_once() -> None:
     bowed, lifted = posture(trunk_flexion=30), posture(right_hip_flexion=45)
-    said = calls(BODY, REST, bowed, FEET), calls(BODY, bowed, bowed, FEET), calls(BODY, bowed, lifted, ("left",))
+    said = calls(BODY, STRAIGHT, bowed, FEET), calls(BODY, bowed, bowed, FEET), calls(BODY, bowed, lifted, ("left",))
     text = cue_sheet(said, ("feet side by side", "feet side by side", "on the left foot"))
     assert text.count("## ") == 2
     assert "**2.** Stay as you are." in text
     assert "**3.** Lift the right thigh forward by about 45°; bring the trunk upright." in text
+
+
+def test_a_person_rests_after_so_many_seconds_and_not_at_last() -> None:
+    dance = small_dance()
+    assert rests(dance) == (False, False)
+    assert rests(replace(dance, rest=1.0)) == (True, False)
+    assert rests(replace(dance, rest=1.5)) == (False, False), "after the last posture the dance is over"
+    sheet = cue_sheet((("stand",), ("bow",)), ("on the stool",) * 2, rests=(True, False))
+    assert sheet.count(REST) == 1
+    assert sheet.index("Stand") < sheet.index(REST) < sheet.index("Bow")

@@ -137,6 +137,17 @@ def test_what_a_person_cannot_do_is_said_in_words(tmp_path: Path) -> None:
     assert written(tmp_path, 'cannot = ["stand"]').seated
 
 
+def test_who_stands_beside_and_when_to_rest_comes_from_protocol_and_person(tmp_path: Path) -> None:
+    own = written(tmp_path, 'rest_after_s = 20\ncare = ["Stop when the shoulder hurts."]\n')
+    for name, rest in (("patient", 20.0), ("easy", 20.0)):
+        _, plan, _ = fit_to_person(BODY, read_plan(name), own)
+        assert (plan.rest, plan.care[-1]) == (rest, "Stop when the shoulder hurts.")
+    usual = read_plan("patient")
+    assert (usual.rest, usual.count, read_plan("chair").count) == (25.0, 12, 12), "a card each, on one page"
+    assert "helper" in usual.care[0]
+    assert fit_to_person(BODY, usual, written(tmp_path, "rest_after_s = 60\n"))[1].rest == 25.0, "it only takes away"
+
+
 def test_groups_of_joints_are_limbs(tmp_path: Path) -> None:
     assert {BODY.joints[j].name for j in joints(BODY, "left_arm")} == {
         *(f"left_shoulder_{way}" for way in ("flexion", "adduction", "rotation")),
@@ -154,6 +165,8 @@ def test_groups_of_joints_are_limbs(tmp_path: Path) -> None:
         ("cannot = ['walk']", "'walk' is not a movement in cannot"),
         ("cannot = 'stand'", "expected a list"),
         ("seat_height_m = 60", "between 0.3 and 1.2"),
+        ("rest_after_s = 2", "between 10 and inf"),
+        ("care = 'a helper'", "expected sentences in a list"),
         ("[weight_bearing]\nleft = 70", "between 0 and 1"),
         ("[weight_bearing]\nleg = 0.5", "'leg' is not a leg in weight_bearing"),
     ],

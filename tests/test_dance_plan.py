@@ -240,6 +240,10 @@ def test_the_plate_is_kept_with_the_dance(tmp_path: Path) -> None:
     for size in (None, (0.4, 0.6)):
         replace(small_dance(), plate=size).save(tmp_path / "dance.npz")
         assert Dance.load(tmp_path / "dance.npz").plate == size
+    careful = replace(small_dance(), care=("A helper stands beside.",), rest=20.0)
+    careful.save(tmp_path / "dance.npz")
+    again = Dance.load(tmp_path / "dance.npz")
+    assert (again.care, again.rest) == (careful.care, careful.rest)
 
 
 def test_the_page_draws_the_plate_with_the_feet_in_its_middle() -> None:

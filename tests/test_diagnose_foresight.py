@@ -1,14 +1,19 @@
 """What a movement will be able to see, before any force is measured."""
 
 from html import escape
+from io import StringIO
 
 import numpy as np
 from diagnosed_sessions import body, known, motion
+from rich.console import Console
+from small_dances import small_dance
 
+from biodance.dance.expectation import expect
 from biodance.diagnosis.foresight import foresee, planned, session_of
 from biodance.effects import effects
 from biodance.report.pages.diagnosis import foresight_page
-from biodance.report.tables.diagnosis import foresight_document
+from biodance.report.tables.diagnosis import FIRST, foresight_document, seen_causes
+from biodance.report.terminal import print_foresight
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 
@@ -56,3 +61,21 @@ def test_what_to_change_is_in_the_words_of_the_causes_that_stay_unseen() -> None
     assert escape(squats.do, quote=True).replace("&#x27;", "&#39;") in page
     assert f"{len(found.seen)} at their typical size" in page
     assert "plate gain (" in page
+
+
+def test_what_a_dance_teaches_and_does_not_leads_and_the_rest_is_folded() -> None:
+    found, dance = foresee(body(), (motion(1),), tolerances=known(), effects=CHOSEN), small_dance()
+    document = foresight_document(found, known=expect(dance, steps=1))
+    assert document["learned"].startswith("Masses that it teaches (by the table alone): ")
+    assert "left forearm hand ±" not in document["learned"], "an arm that is lifted once teaches not its hand"
+    assert len(seen_causes(document)) == len(found.seen) > 0
+    page = foresight_page(document, "the dance")
+    order = ["What it can tell", "What it cannot tell", "What to change", "<details>", "What looks alike"]
+    places = [page.index(text) for text in order]
+    assert places == sorted(places)
+    console = Console(width=200, record=True, file=StringIO())
+    print_foresight(document, console)
+    told = console.export_text()
+    assert told.count("to change:") == min(FIRST, len(found.changes))
+    assert document["learned"] in told
+    assert len(told.splitlines()) < 20

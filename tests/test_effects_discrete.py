@@ -77,11 +77,11 @@ def test_every_discrete_effect_says_what_it_is(name: str) -> None:
 
 def test_nothing_is_found_where_nothing_is_wrong() -> None:
     value = standing(np.random.default_rng(0))
-    found = check_quality(recorded(value).session)
+    found = check_quality(recorded(value))
     assert failed(found) == []
     assert {quality.check for quality in found} == {"range of the channels", "mains hum", "weight on the plates"}
     moving = human_case(600)
-    found = check_quality(session_of(moving).session, (moving, moving))
+    found = check_quality(Recorded(session_of(moving).session, (moving, moving)))
     assert failed(found) == []
     assert {quality.check for quality in found} >= {
         "signs of the channels",
@@ -127,7 +127,7 @@ def test_what_the_reader_overruled_is_told() -> None:
         "the plate axes were turned by 90 degrees.",
     )
     unit = "POINT:UNITS is 'furlong'; a cloud of markers of 1723 can only be in mm, so lengths are in mm."
-    found = check_quality(recorded(standing(np.random.default_rng(3)), decisions=said, warnings=(unit,)).session)
+    found = check_quality(recorded(standing(np.random.default_rng(3)), decisions=said, warnings=(unit,)))
     assert failed(found) == [("axis_error", "plate1:axes"), ("unit_error", "markers"), ("unit_error", "plate1:moments")]
     assert sorted(quality.size for quality in found if quality.size > 0) == [90, 1000]
 
@@ -135,7 +135,7 @@ def test_what_the_reader_overruled_is_told() -> None:
 def test_one_unit_is_one_cause_though_every_trial_tells_its_own_number() -> None:
     said = (f"POINT:UNITS is 'mm'; a cloud of markers of {size} can only be in m, so lengths are in m." for size in
             ("1.431", "1.445", "1.545"))  # fmt: skip
-    found = check_quality(recorded(standing(np.random.default_rng(3)), warnings=tuple(said)).session)
+    found = check_quality(recorded(standing(np.random.default_rng(3)), warnings=tuple(said)))
     assert failed(found) == [("unit_error", "markers")]
     assert "1.431" in next(one.text for one in found if not one.ok)
 
@@ -247,8 +247,7 @@ def test_the_library_can_lack_an_effect() -> None:
     assert list(effects(names)) == names
     assert list(discrete_effects(("clipping",))) == ["clipping"]
     assert {
-        quality.effect
-        for quality in check_quality(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))
+        quality.effect for quality in check_quality(recorded(standing(np.random.default_rng(7))), chosen=("mains_hum",))
     } <= {"", "mains_hum"}
     with pytest.raises(UnknownName, match="plate_gain"):
         effects(("plate_gian",))

@@ -16,7 +16,6 @@ from biodance.motion.track import track
 from biodance.records import Array, Markers, Subject
 from biodance.spatial import point_mass
 
-CASE = human_case()
 INSIDE = slice(60, -60)
 """The first and last half second depend on how the low-pass continues the ends."""
 CAUSES = [
@@ -33,9 +32,9 @@ CAUSES = [
 
 def differences(name: str, target: str, component: int) -> tuple[Array, Array]:
     """Return the changes of the wrench (T, 6) and of the residual (K, 3) per metre, by tracking twice."""
-    found = effect(name).at(target, CASE)
+    found = effect(name).at(target, human_case())
     step = 0.002 * np.eye(found.typical.size)[component]
-    plus, minus = (found.corrected(CASE, sign * step) for sign in (1, -1))
+    plus, minus = (found.corrected(human_case(), sign * step) for sign in (1, -1))
     wrench = (
         predict_wrench(plus.body, plus.motion, plus.phi).value
         - predict_wrench(minus.body, minus.motion, minus.phi).value
@@ -46,25 +45,25 @@ def differences(name: str, target: str, component: int) -> tuple[Array, Array]:
 @pytest.mark.parametrize(("name", "target", "component"), CAUSES)
 def test_columns_are_those_of_tracking_again(name: str, target: str, component: int) -> None:
     wrench, rows = differences(name, target, component)
-    found = effect(name).at(target, CASE)
-    error = found.columns(CASE)[INSIDE, :, component] - wrench[INSIDE]
+    found = effect(name).at(target, human_case())
+    error = found.columns(human_case())[INSIDE, :, component] - wrench[INSIDE]
     for part in (slice(0, 3), slice(3, 6)):
         assert np.linalg.norm(error[:, part]) < 0.05 * np.linalg.norm(wrench[INSIDE])
-    predicted = found.marker_columns(CASE)
+    predicted = found.marker_columns(human_case())
     assert predicted is not None
     np.testing.assert_allclose(predicted[:, :, component], rows, atol=0.015)
 
 
 def test_true_marker_place_leaves_no_mean_residual() -> None:
     """A marker 20 mm off shows in its row; the corrected case has the residual of the marker put right."""
-    found = effect("marker_misplaced").at("RTIB", CASE)
+    found = effect("marker_misplaced").at("RTIB", human_case())
     shift = np.array([0.0, 0.02, 0.0])
-    wrong = found.corrected(CASE, -shift)
+    wrong = found.corrected(human_case(), -shift)
     right = found.corrected(wrong, shift)
-    np.testing.assert_allclose(right.marker_residual, CASE.marker_residual, atol=1e-6)
+    np.testing.assert_allclose(right.marker_residual, human_case().marker_residual, atol=1e-6)
     change = wrong.marker_residual - right.marker_residual
-    row = CASE.marker_columns.index(CASE.body.markers.names.index("RTIB"))
-    rows = found.marker_columns(CASE)
+    row = human_case().marker_columns.index(human_case().body.markers.names.index("RTIB"))
+    rows = found.marker_columns(human_case())
     assert rows is not None
     predicted = rows @ shift
     assert np.linalg.norm(change[row]) > 0.01
@@ -73,13 +72,13 @@ def test_true_marker_place_leaves_no_mean_residual() -> None:
 
 def test_a_moved_marker_is_measured_from_postures_that_do_not_follow_it() -> None:
     """A marker that sits 50 mm off in every frame: the tracked body follows it half the way."""
-    shift, body = np.array([0.05, 0.0, 0.01]), CASE.body
+    shift, body = np.array([0.05, 0.0, 0.01]), human_case().body
     index = body.markers.names.index("RKNE")
-    pose = poses(body, CASE.motion.q)
+    pose = poses(body, human_case().motion.q)
     xyz = np.array(pose.points(body.markers.segment, body.markers.position))
     xyz[:, index] += pose.rotation[:, body.markers.segment[index]] @ shift
-    trial = replace(CASE.trial, markers=Markers(body.markers.names, CASE.motion.time, xyz))
-    case = replace(CASE, trial=trial, motion=track(body, trial))
+    trial = replace(human_case().trial, markers=Markers(body.markers.names, human_case().motion.time, xyz))
+    case = replace(human_case(), trial=trial, motion=track(body, trial))
     found = effect("marker_misplaced").at("RKNE", case)
     followed = case.marker_residual[case.marker_columns.index(index)]
     assert np.linalg.norm(followed) < 0.7 * np.linalg.norm(shift)
@@ -89,9 +88,9 @@ def test_a_moved_marker_is_measured_from_postures_that_do_not_follow_it() -> Non
 
 
 def test_trial_without_the_marker_says_nothing_about_it() -> None:
-    assert CASE.trial.markers is not None
-    fewer = CASE.trial.markers.select(name for name in CASE.trial.markers.names if name != "LTIB")
-    blind = replace(CASE, trial=replace(CASE.trial, markers=fewer))
+    assert human_case().trial.markers is not None
+    fewer = human_case().trial.markers.select(name for name in human_case().trial.markers.names if name != "LTIB")
+    blind = replace(human_case(), trial=replace(human_case().trial, markers=fewer))
     found = replace(effect("marker_misplaced"), target="LTIB")
     assert not found.columns(blind).any()
     rows = found.marker_columns(blind)
@@ -141,12 +140,12 @@ def test_joint_at_its_limit_does_not_answer() -> None:
     """A knee that its markers push beyond straight for most of the trial stays where it is; one that is pulled off
     the limit does not.
     """
-    names = [j.name for j in CASE.body.joints]
+    names = [j.name for j in human_case().body.joints]
     knee = names.index("right_knee_flexion")
-    answer = CASE.body_geometry().sensitivity
+    answer = human_case().body_geometry().sensitivity
     straight = np.array(answer.angles)
-    straight[:, knee] = CASE.body.limits.lower[knee]
-    coordinate = CASE.body.n_root + knee
+    straight[:, knee] = human_case().body.limits.lower[knee]
+    coordinate = human_case().body.n_root + knee
     push = answer.tangent[..., coordinate]
     for sign, answers in ((1.0, False), (-1.0, True)):
         at_limit = replace(answer, angles=straight, apart=0.01 * sign * push)

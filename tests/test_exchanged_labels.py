@@ -21,6 +21,7 @@ from biodance.lab.c3d.raw import read_raw
 from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels, write_mended
+from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.session import examine
 from biodance.records import Markers, Session, Source, Subject, Trial
 
@@ -232,12 +233,13 @@ def test_an_exchange_of_some_frames_is_put_right_in_a_copy_and_nothing_else(data
 @pytest.mark.parametrize("child", ["HC002D", "HC036A"])
 def test_swinging_arms_are_no_exchanged_hands_and_accepting_writes_no_label(child: str, data: Path) -> None:
     result = examine(read_session(data / "biomechzoo" / child))
-    assert with_right_labels(result, tell=lambda text: None) is None
+    assert with_right_labels(result, recorded_of(result), tell=lambda text: None) is None
 
 
 def test_accepting_writes_what_it_says_and_nothing_else(data: Path, tmp_path: Path) -> None:
     session = read_session(data / "biomechzoo/HC055A")
-    right = with_right_labels(examine(session), tell=lambda text: None)
+    result = examine(session)
+    right = with_right_labels(result, recorded_of(result), tell=lambda text: None)
     assert {name: set(pairs) for name, pairs in right.exchanged.items()} == {"HC055A34": set(map(sorted_pair, HEAD))}
     written, refused = write_mended(session, right, tmp_path)
     assert [one.file for one in written] == ["mended/HC055A34.c3d"]

@@ -4,6 +4,8 @@ import hashlib
 import json
 import re
 from base64 import b64decode
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +19,14 @@ from biodance.body.body import Body
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import MovementInformation, expect, movement_information
-from biodance.errors import BiodanceError
+from biodance.dance.visit_log import read_visit_logs
+from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Motion
 from biodance.report.pages import feedback
 from biodance.report.pages.feedback import follow_scene, scene_of, write_feedback
+from biodance.report.tables.identification import VISIT_ROW, log_in_words
 from biodance.spatial import wrench_shift
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.noise import Noise
@@ -200,8 +204,6 @@ def test_more_movement_tells_more_and_no_movement_nothing_new(dance: Dance) -> N
 
 
 def test_a_body_that_the_camera_does_not_know_is_not_followed(dance: Dance) -> None:
-    from dataclasses import replace
-
     scene = follow_scene(dance)
     assert scene is not None
     assert {one["name"] for one in scene["points"]} >= {"left wrist", "right ankle"}
@@ -268,6 +270,127 @@ def test_a_browser_follows_counts_and_says_whom_it_does_not_see(dance: Dance, tm
         assert browser.run("[document.body.dataset.phase, playing]") == ["ready", False]
         assert browser.asked() == [page.as_uri()]
         assert not [said for said in browser.said() if "WebGL" not in said]
+
+
+def four_postures() -> Dance:
+    """Return the small dance once more behind itself: four postures on the same feet, a rest after the second one."""
+    dance = small_dance()
+    x, via = np.tile(dance.postures, (2, 1)), np.concatenate([dance.via, dance.via[:, ::-1], dance.via])
+    feet, under = dance.stances[:1] * 4, dance.under * 3
+    twice = Dance(dance.protocol, dance.body, x, feet, np.ones(4), via, np.full(3, 2.0), under, 0)
+    return replace(twice, care=("A helper stands beside.",), rest=3.5)
+
+
+@pytest.fixture(scope="module")
+def leading(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Page, str]]:
+    """Yield a browser and the address of a page that leads through `four_postures` and does not follow."""
+    dance, path = four_postures(), tmp_path_factory.mktemp("leads") / "page.html"
+    path.write_text(feedback.feedback_page(dance.protocol, scene_of(dance), None, care=dance.care), encoding="utf-8")
+    with Page(path.as_uri()) as browser:
+        yield browser, path.as_uri()
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_a_posture_is_left_out_half_as_far_or_once_more_and_the_log_says_so(
+    leading: tuple[Page, str], tmp_path: Path
+) -> None:
+    dance, (browser, address) = four_postures(), leading
+    cues = scene_of(dance)["cues"]
+    assert [cue["rest"] for cue in cues] == [False, True, False, False]
+    assert [len(cue["after_skips"]) for cue in cues] == [0, 0, 1, 2]
+    assert cues[2]["after_skips"] == [[]], "the third posture is the first one: nothing moves"
+    assert cues[3]["after_skips"] == [[], cues[1]["calls"]]
+    now = "[document.getElementById('now').textContent, document.getElementById('calls').innerText]"
+    browser.open(f"{address}#t=0.5")
+    assert "A helper stands beside." in browser.run("document.getElementById('care').textContent")
+    browser.key("e")
+    assert browser.run(now)[1].split("\n") == ["only half of the way:", *cues[1]["calls"]]
+    browser.run("second = cues[1].hold_s + 0.5; show()")
+    planned = browser.run("body.children.map((one) => one.quaternion.toArray())")
+    browser.run("half.clear(); second = (cues[1].move_s + cues[1].hold_s) / 2; show()")
+    assert np.allclose(planned, browser.run("body.children.map((one) => one.quaternion.toArray())"))
+    browser.run("second = 0.5; show()")
+    browser.key("ArrowRight")
+    assert browser.run("[second, [...left_out], reached(1)]") == [cues[1]["hold_s"], [1], cues[0]["hold_s"]]
+    assert browser.run("document.getElementById('skip').disabled") is False
+    browser.key("ArrowLeft")
+    assert browser.run("[second, left_out.size, pausing, wait]") == [cues[0]["hold_s"], 0, "back", 2.0]
+    assert browser.run(now)[0] == "Take up posture 1 again. Next:"
+    danced = "dispatchEvent(new CustomEvent('danced', { detail: { phase: 'hold', cue: %d, spent: %g } }))"
+    browser.run("pausing = ''; " + danced % (0, 1.0) + ";" + danced % (1, 0.5))
+    browser.run("second = cues[1].hold_s + 0.5; repeat(); second = cues[1].hold_s + 0.5; skip(); easier()")
+    log = browser.run("visit()")
+    (tmp_path / "dance_log_a.json").write_text(json.dumps(log))
+    (tmp_path / "dance_log_b.json").write_text(json.dumps(log | {"mark": "0", "begun": "2020-01-01T10:00:00Z"}))
+    other, mine = read_visit_logs(tmp_path, dance)
+    assert (other.same, mine.same, mine.camera) == (False, True, False)
+    assert [one.times for one in mine.postures] == [1, 2, 0, 0]
+    assert [one.held_s for one in mine.postures] == [1.0, 0.5, 0.0, 0.0]
+    assert [mine.numbers(what) for what in ("repeated", "skipped", "easier")] == [(2,), (3,), (4,)]
+    row = VISIT_ROW.row(mine)
+    assert log_in_words(row) == "dance_log_a.json: 2 of 4 postures danced; skipped 3; easier 4; repeated 2."
+    (tmp_path / "dance_log_c.json").write_text(json.dumps(log | {"speed": "fast"}))
+    with pytest.raises(FileRefused, match=r"dance_log_c.json: is no log of a dance \(.*speed"):
+        read_visit_logs(tmp_path, dance)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_the_page_rests_shows_first_and_speaks_only_when_asked_by_a_voice_of_this_computer(
+    leading: tuple[Page, str],
+) -> None:
+    dance, (browser, address) = four_postures(), leading
+    cue = scene_of(dance)["cues"][2]
+    voices = """window.spoken = []; speechSynthesis.getVoices = () => window.own ?? [];
+        speechSynthesis.speak = (one) => window.spoken.push(one.text);
+        window.SpeechSynthesisUtterance = function (text) { this.text = text; }; """
+    browser.open(f"{address}#t=0.9")
+    browser.run(voices + "run(true)")
+    browser.until("document.body.dataset.phase === 'move'")
+    assert browser.run("spoken") == [], "off unless asked for"
+    own = "own = [{ localService: false, lang: 'en-GB' }, { localService: true, lang: 'en-GB' }]; "
+    browser.run("by('speak').checked = by('first').checked = true; speak('one')")
+    assert "no English voice of its own" in browser.run("by('said').textContent")
+    browser.run(own + "second = cues[1].hold_s - 0.05")
+    browser.until("wait > 0 && spoken.length")
+    assert browser.run("spoken.at(-1)") == " ".join(["Stand still. Next:", *cue["calls"]]).replace("°", " degrees")
+    assert 0 < browser.run("wait") <= 2 * (cue["hold_s"] - cue["move_s"]) - 0.5, "as long as the slow motion lasts"
+    browser.run(f"wait = 0; second = {cue['move_s']} - 0.05")
+    browser.until("!playing")
+    assert browser.run("[by('now').textContent, pausing]") == ["Rest. Let the arms down", "rest"]
+    browser.run("run(true)")
+    assert browser.run("[pausing, wait]") == ["back", 5]
+    browser.until("spoken.at(-1).startsWith('Take up posture 2 again. Next:')", 10.0)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_progress_shows_a_column_a_visit_and_names_files_that_are_no_logs(leading: tuple[Page, str]) -> None:
+    browser, address = leading
+    browser.open(address)
+    posture = {"times": 1, "held_s": 2.0, "skipped": False, "easier": True, "reached_deg": {"left arm lifted": 62}}
+    log = {"biodance_dance_log": 1, "dance": "patient", "begun": "2026-03-0%dT10:00:00Z", "postures": [posture]}
+    files = [json.dumps(log).replace("%d", str(day)) for day in (2, 1)] + ["{}"]
+    browser.run(
+        "(() => { const some = new DataTransfer(); "
+        + json.dumps(files)
+        + ".forEach((text, k) => some.items.add(new File([text], `log${k}.json`)));"
+        "by('earlier').files = some.files; return by('earlier').onchange(); })()"
+    )
+    rows = browser.run("[...by('progress').rows].map((row) => [...row.cells].map((one) => one.textContent))")
+    assert rows[0] == ["visit", "2026-03-01", "2026-03-02"]
+    assert rows[1:4] == [["dance", *["patient"] * 2], ["postures", *["1 of 1"] * 2], ["easier", "1", "1"]]
+    assert rows[-1] == ["left arm lifted", "62°", "62°"]
+    assert browser.run("by('unread').textContent").startswith("No log of a dance: log2.json")
+
+
+@SEEN
+def test_how_far_joints_go_is_told_in_degrees(tmp_path: Path) -> None:
+    dance = small_dance()
+    write_feedback(dance, tmp_path / "page.html")
+    with Page((tmp_path / "page.html").as_uri()) as browser:
+        assert browser.run("window.followed.reach(0)") is None, "nothing was seen"
+        found = browser.run("window.followed.angles(cues[1].hold_s)")
+    assert found["left arm lifted"] - found["right arm lifted"] == pytest.approx(np.degrees(0.6), abs=4.0)
+    assert found["left elbow bent"] == pytest.approx(np.degrees(0.2), abs=8.0), "the wrist is where its markers are"
 
 
 @SEEN

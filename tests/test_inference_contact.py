@@ -77,6 +77,6 @@ def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> 
         force = strength[:, None] * np.array([0.0, 0.3, 1.0])
         return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
 
-    diagnosis = inferred(one, windows(1, hidden=touched), tolerances=known(), effects=CAUSES).diagnosis
+    diagnosis = inferred(one, windows(1, trials=2, hidden=touched), tolerances=known(), effects=CAUSES).diagnosis
     assert [(f.effect, f.target) for f in diagnosis.findings] == [("external_contact", "left_foot")]
     assert diagnosis.findings[0].parameters[2].value == pytest.approx(6.0, abs=1.5)

@@ -137,9 +137,10 @@ def test_the_information_on_a_scale_is_that_of_many_draws() -> None:
     """Its inverse is the variance of the most probable logarithm: the variance of the slope, over bodies drawn."""
     rng = np.random.default_rng(6)
     drawn, at, slopes = rows(rng, observations=0, width=8), SCALES[0], []
-    root = np.linalg.cholesky(covariance(drawn, at))
+    root, columns, none = np.linalg.cholesky(covariance(drawn, at)), VisibleColumns.of(drawn), np.empty((72, 0))
     for _ in range(1500):
-        one = posterior(inner(with_target(drawn, root @ rng.normal(size=len(drawn.y)))), prior_sd(drawn), at)
+        target = root @ rng.normal(size=len(drawn.y))
+        one = posterior(products(columns, none, target, sure(drawn)), prior_sd(drawn), at)
         own = np.bincount(drawn.group, weights=one.u**2)
         slopes.append(own + one.curvature(3).shares - np.bincount(drawn.group))
     np.testing.assert_allclose(np.mean(slopes, axis=0), 0.0, atol=0.35)

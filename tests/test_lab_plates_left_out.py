@@ -10,7 +10,7 @@ from effect_cases import failed
 from lab_sessions import GRAVITY, PLUG_IN_GAIT, person
 from plate_emulator import RATE, Emulated, channels, raw_file
 
-from biodance.effects import check_quality
+from biodance.effects import Recorded, check_quality
 from biodance.lab.inspect import inspect_file
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.read import read_plates
@@ -98,7 +98,7 @@ def test_padding_at_both_ends_is_left_out_and_said_once(padded: Trial) -> None:
 
 
 def test_padding_is_named_and_no_channel_called_clipped(padded: Trial) -> None:
-    found = check_quality(session_of(padded), chosen=("padding", "clipping"))
+    found = check_quality(Recorded(session_of(padded)), chosen=("padding", "clipping"))
     assert failed(found) == [("padding", "")]
     (one,) = [quality for quality in found if not quality.ok]
     assert one.size == pytest.approx(0.05)
@@ -154,7 +154,7 @@ def test_a_dead_plate_is_named_and_turns_no_other_round(dead: float, squat: floa
     assert (warnings, history) == ((), (one.text,))
     assert one.text.startswith("Plate 3 was left out, and what it carried is missing from the total: it reads")
     trial = Trial("squat", "fit", markers(), plates, Source(Path("squat.c3d"), "", "C3D", 100.0, RATE), defects=defects)
-    found = [quality for quality in check_quality(session_of(trial)) if quality.effect == "dead_plate"]
+    found = [quality for quality in check_quality(Recorded(session_of(trial))) if quality.effect == "dead_plate"]
     assert [(quality.target, quality.ok, quality.mended) for quality in found] == [("plate3", False, True)]
 
 
@@ -217,7 +217,7 @@ def test_data_that_are_scaled_already_are_told_by_the_weight(tmp_path: Path, squ
     assert "): the floating-point data are already scaled, and SCALE was not applied." in said
     if not squat:
         assert standing_mass(trial) == pytest.approx(MASS, rel=1e-3)
-    assert failed(check_quality(session_of(trial), chosen=("unit_error",))) == []
+    assert failed(check_quality(Recorded(session_of(trial)), chosen=("unit_error",))) == []
 
 
 def test_a_scale_that_is_needed_is_applied(tmp_path: Path) -> None:

@@ -10,19 +10,24 @@ import numpy as np
 import pytest
 from accessible import ASKED, complaints, unfold
 from browser import Page
+from stream_faults import exchanged, offset, silent
 
+from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.recursive import initial_posterior
+from biodance.motion.kinematics import poses
+from biodance.pipeline.asked import asked_posture, asked_words
 from biodance.pipeline.live import LiveSession, LiveState, StreamWatch
 from biodance.pipeline.stream import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
 from biodance.report.live import LivePage
 from biodance.virtual_lab.simulate import simulate_session
 
+BODY = human(Subject(63.0, 1.68, "F", 30.0))
 FAULT = 6.0
 """s at which faults begin."""
 
@@ -46,40 +51,17 @@ def until(trial, seconds: float):
     return replace(trial, markers=markers)
 
 
-def on_plate(trial, change):
-    """Return the trial with the wrench of its plate changed by ``change(value, rows)`` from FAULT on."""
-    (plate,) = trial.plates
-    value = np.array(plate.wrench.value)
-    change(value, np.flatnonzero(plate.wrench.time >= FAULT))
-    return replace(trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),))
-
-
-def push(value, rows):
-    value[rows, 2] += 30.0
-
-
-def silence(value, rows):
-    value[rows] = value[rows[0] - 1]
-
-
-def exchange(trial, one, other):
-    markers, xyz = trial.markers, np.array(trial.markers.xyz)
-    i, k, rows = markers.names.index(one), markers.names.index(other), markers.time >= FAULT
-    xyz[np.ix_(rows, [i, k])] = xyz[np.ix_(rows, [k, i])]
-    return replace(trial, markers=Markers(markers.names, markers.time, xyz))
-
-
-FAULTS = {
-    ("plate_offset", "plate1:Fz"): lambda trial: on_plate(trial, push),
-    ("plate_gone", "plate1"): lambda trial: on_plate(trial, silence),
-    ("labels_swapped", "LASI/RASI"): lambda trial: exchange(trial, "LASI", "RASI"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed, fault):
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (offset, ("plate_offset", "plate1:Fz")),
+        (silent, ("plate_gone", "plate1")),
+        (exchanged, ("labels_swapped", "LASI/RASI")),
+    ],
+)
+def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed, change, fault):
     body, trial = streamed
-    session = LiveSession(body, until(FAULTS[fault](trial), FAULT + 2.0))
+    session = LiveSession(body, until(change(trial, FAULT)[0], FAULT + 2.0))
     said = [one for _ in range(session.markers.time.size) for one in session.push()]
     assert [(one.effect, one.target) for one in said] == [fault]
     assert FAULT < said[0].time_s <= FAULT + 5.0
@@ -155,11 +137,35 @@ def test_the_page_shows_the_newest_state_to_this_machine_alone():
 def test_nobody_is_shut_out_of_the_page():
     state = LiveState(3.0, {"left_thigh": "known", "pelvis": "partly known"}, ("Plate 1 fell silent.",), "Mend it.")
     with LivePage() as page, Page("about:blank#begin") as browser:
+        page.body, state = BODY, replace(state, asked="left_thigh")
         page.show(state)
         page.warn(LiveWarning(2.5, "plate_gone", "plate1", "Plate 1 fell silent."))
         unfold(browser, page.address)
         browser.until("/Mend it/.test(document.body.innerText) && /thigh/.test(document.body.innerText)", 10.0)
         assert complaints(browser) == []
+
+
+@pytest.mark.parametrize("segment", [name for name in BODY.segments if not name.endswith("foot")])
+def test_what_is_asked_can_be_done_and_is_drawn(segment: str) -> None:
+    said, q = asked_words(segment), asked_posture(BODY, segment)
+    assert segment.partition("_")[0] in said or not segment.startswith(("left", "right")) or "both" in said
+    assert "further and faster" not in said
+    angles = q[BODY.nq - len(BODY.joints) :]
+    assert np.all((BODY.limits.lower <= angles + 1e-9) & (angles <= BODY.limits.upper + 1e-9)), "a person can do it"
+    posed = poses(BODY, q)
+    soles = [BODY.segment_index(f"{side}_foot") for side in ("left", "right")]
+    assert posed.rotation[0, soles][:, 2, 1] == pytest.approx(1.0, abs=1e-6), "flat on the floor"
+    assert np.abs(angles).max() > 0.3
+
+
+def test_the_page_draws_what_is_asked_once_it_knows_the_body() -> None:
+    with LivePage() as page:
+        for body, drawn in ((None, False), (BODY, True)):
+            page.body = body
+            page.show(LiveState(3.0, {}, (), asked_words("left_upper_arm"), "left_upper_arm"))
+            said = json.loads(urlopen(f"{page.address}state.json").read())
+            assert said["next"] == "Lift the left arm sideways to shoulder height, and let it down again."
+            assert said["picture"].startswith("<svg") == drawn
 
 
 def test_the_running_belief_is_least_squares_with_the_prior():

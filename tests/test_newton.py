@@ -1,6 +1,8 @@
 """Newton: the total force against the trunk, on sessions of other laboratories, and on squats without any error."""
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
 from biodance.observations import observe, recording
 from biodance.pipeline.checks import WeighedBy, weigh, with_weighed_mass
-from biodance.records import Wrench
+from biodance.records import Session, Wrench
 
 CLEAN = {
     "biomechzoo/HC030A": ("HC030A05", "HC030A22"),
@@ -25,6 +27,12 @@ CLEAN = {
     "subject4": ("squats1", "walking1"),
 }
 """Trials of six laboratories whose clocks are right."""
+
+
+@cache
+def recorded(folder: Path) -> Session:
+    """Return a session, which nobody changes, read once."""
+    return read_session(folder)
 
 
 def told(trial, mass=float("nan")):
@@ -43,7 +51,7 @@ def moved(trial, seconds):
 
 @pytest.mark.parametrize("folder", CLEAN)
 def test_clean_recordings_go_with_the_trunk_to_within_12_ms(folder, data):
-    one = read_session(data / folder)
+    one = recorded(data / folder)
     for name in CLEAN[folder]:
         found = told(one[name], one.subject.mass)
         assert abs(found.lag) < 0.012, name
@@ -52,13 +60,13 @@ def test_clean_recordings_go_with_the_trunk_to_within_12_ms(folder, data):
 
 def test_30_ms_written_in_are_seen_as_30(data):
     for folder in ("biomechzoo/HC044A", "c3d_parser_QCMAS", "subject4"):
-        one = read_session(data / folder)
+        one = recorded(data / folder)
         trial = one[CLEAN[folder][0]]
         assert told(moved(trial, 0.03)).lag - told(trial).lag == pytest.approx(0.03, abs=0.002)
 
 
 def test_a_chair_that_carries_along_says_by_itself_that_nothing_can_be_told(data):
-    one = read_session(data / "subject4")
+    one = recorded(data / "subject4")
     for name in ("STS1", "STSAsym1", "STSweakLegs1"):
         found = told(one[name])
         assert found.correlation < 0.7
@@ -66,7 +74,7 @@ def test_a_chair_that_carries_along_says_by_itself_that_nothing_can_be_told(data
 
 
 def test_squats_weigh_what_the_plates_weigh_in_standing(data):
-    one = read_session(data / "subject4")
+    one = recorded(data / "subject4")
     found = told(one["squats1"])
     assert found.mass == pytest.approx(60.05, abs=0.2)
     assert 0.1 < found.mass_sd < 0.3
@@ -95,7 +103,7 @@ def test_the_witness_sees_a_delay_and_a_weight():
 )
 def test_strides_weigh_who_never_stands_still(folder, mass, by, data):
     """S005 is declared 60.0 and FMC 81.0 kg: both weigh less, by two speeds of a belt and by two walks."""
-    found = weigh(read_session(data / folder), None)
+    found = weigh(recorded(data / folder), None)
     assert found.mass == pytest.approx(mass, abs=0.4)
     assert found.by is by
     assert 0.2 < found.sd < 0.6
@@ -121,24 +129,24 @@ def test_who_declared_no_mass_and_never_stands_still_is_weighed_while_moving():
 @pytest.mark.parametrize(("folder", "mass"), [("gait10", 72.6), ("raj_walk", 85.0), ("raj_run", 72.84)])
 def test_real_people_without_a_mass_are_weighed(folder, mass, data):
     """A walk, another one, a run; the masses as their publishers give them, of raj_walk by the strides."""
-    found = with_weighed_mass(read_session(data / "opensim_models" / folder)).subject
+    found = with_weighed_mass(recorded(data / "opensim_models" / folder)).subject
     assert found.mass == pytest.approx(mass, rel=0.006)
     assert "mass" in found.guessed
 
 
 def test_every_flight_is_a_zero_of_every_channel(data):
     """S017: 38 N in the static trial and 19 N in every flight; S009: 15 N in every flight."""
-    checks = PlateOffset.check(Recorded(read_session(data / "rbds/S017")))
+    checks = PlateOffset.check(Recorded(recorded(data / "rbds/S017")))
     found = {(one.target, one.trials): one.size for one in checks if not one.ok}
     assert found[("Fy", ("runT25", "runT35"))] == pytest.approx(-19, abs=1)
     assert found[("Fy", ("static",))] == pytest.approx(-38, abs=1)
     assert len(found) == 2
-    (nine,) = (one for one in PlateOffset.check(Recorded(read_session(data / "rbds/S009"))) if not one.ok)
+    (nine,) = (one for one in PlateOffset.check(Recorded(recorded(data / "rbds/S009"))) if not one.ok)
     assert (nine.target, nine.size) == ("Fy", pytest.approx(15.5, abs=1.5))
 
 
 def test_what_is_taken_off_leaves_flights_at_zero(data):
-    one = read_session(data / "rbds/S017")
+    one = recorded(data / "rbds/S017")
     failed = next(check for check in PlateOffset.check(Recorded(one)) if not check.ok and "runT25" in check.trials)
     right = replace(one, trials=tuple(PlateOffset.undone(trial, failed) for trial in one.trials))
     assert all("runT25" not in check.trials for check in PlateOffset.check(Recorded(right)) if not check.ok)
@@ -146,10 +154,10 @@ def test_what_is_taken_off_leaves_flights_at_zero(data):
 
 @pytest.mark.parametrize("folder", ["rbds/S001", "subject4", "opensim_models/raj_run"])
 def test_plates_that_read_zero_are_not_accused(folder, data):
-    assert all(check.ok for check in PlateOffset.check(Recorded(read_session(data / folder))))
+    assert all(check.ok for check in PlateOffset.check(Recorded(recorded(data / folder))))
 
 
 @pytest.mark.parametrize("folder", ["biomechzoo/HC030A", "c3d_parser_FMC", "gaitalytics", "pycgm"])
 def test_no_clean_recording_is_late_or_has_exchanged_plates(folder, data):
-    recorded = Recorded(read_session(data / folder))
-    assert all(check.ok for check in (*TimeDelay.check(recorded), *PlatesExchanged.check(recorded)))
+    seen = Recorded(recorded(data / folder))
+    assert all(check.ok for check in (*TimeDelay.check(seen), *PlatesExchanged.check(seen)))

@@ -4,8 +4,10 @@ plate.
 """
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,13 +24,34 @@ from biodance.identification.validation import validate
 from biodance.lab.corrections import PlateCorrection, corrected_trial, correction_doubts
 from biodance.lab.plates.faults import OFFSET
 from biodance.motion.dynamics import predict_wrench
+from biodance.pipeline import diagnosis
+from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.gains import proven
+from biodance.pipeline.results import SessionResult
 from biodance.records import Plate, Source, Trial, Wrench
 from biodance.spatial import wrench_about_origin
 
 TRIALS = ("static", "move_1", "move_5", "squat_1")
 WRONG = ("axis_error:target=Fy", "plate_offset:target=Mz,offset=12")
 CORNERS = np.array([[0.6, 0.5, 0.0], [0.2, 0.5, 0.0], [0.2, -0.1, 0.0], [0.6, -0.1, 0.0]])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _the_same_recordings_are_diagnosed_once() -> Iterator[None]:
+    """Let `report` have what `identify` found in the same recordings: both ask the same function for it."""
+    known: dict[tuple[str, ...], tuple[SessionResult, SessionDiagnosis | None]] = {}
+    diagnosed = diagnosis.diagnosed_and_corrected
+
+    def once(result: SessionResult, **how: Any) -> tuple[SessionResult, SessionDiagnosis | None]:
+        assert how["reference"] is None, "what is known of an earlier session is no part of the key"
+        key = tuple(sorted(one.source.sha256 for one in result.session.trials))
+        if key not in known:
+            known[key] = diagnosed(result, **how)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diagnosis, "diagnosed_and_corrected", once)
+        yield
 
 
 def identified(folder: Path, capsys: pytest.CaptureFixture[str], *texts: str) -> tuple[dict, str, str]:

@@ -49,10 +49,17 @@ def test_a_dance_is_performed_by_the_person_it_was_designed_for(danced: Path) ->
 
 def test_identify_says_how_well_it_was_danced(danced: Path, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
+    posture = {"number": 1, "times": 2, "held_s": 3.0, "skipped": False, "easier": False}
+    log = {"biodance_dance_log": 1, "dance": "one_segment", "mark": Dance.load(danced / "dance.npz").mark}
+    log |= {"begun": "2026-03-02T10:00:00Z", "camera": False, "speed": 1, "known_percent": None}
+    log["postures"] = [posture | {"told_percent": None, "reached_deg": None}]
+    (danced / "visit" / "dance_log_2026.json").write_text(json.dumps(log))
     words = ["identify", str(danced / "visit"), "--dance", str(danced / "dance.npz"), "--out", str(danced / "out")]
     assert run([*words, "--json"]) in (0, 1)
     told = json.loads(capsys.readouterr().out)["performance"]
     assert told["repeat"] == [1]
+    (noted,) = told["logs"]
+    assert (noted["same"], noted["danced"], noted["repeated"]) == (True, 1, [1])
     rows = {row["segment"]: row for row in told["excitation"]}
     assert len(rows) == 12
     assert 0 < rows["left_upper_arm"]["reached"] < 1
@@ -146,7 +153,10 @@ def test_a_dance_is_played_and_filmed(tmp_path: Path, capsys: pytest.CaptureFixt
     assert told["touched"] == []
     assert told["played_s"] == pytest.approx(3.0)
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.n_frames == pytest.approx(3.0 * 12.5, abs=2)
+        assert film.size == (4 * 290, 480), "planned and played, each from the front and from the right"
+        lasts = [film.seek(k) or film.info["duration"] for k in range(film.n_frames)]
+    assert sum(lasts) == pytest.approx(3000, abs=80), "ms, pictures that are alike shown longer"
+    assert min(lasts) == 40
     assert run([*words, str(tmp_path / "film.gif")]) == 2
     assert "--force" in capsys.readouterr().err
     assert run([*words, str(tmp_path / "film.avi")]) == 2

@@ -4,8 +4,10 @@ import re
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from identified_sessions import session_result
 from made_cycles import walked_knees
@@ -17,6 +19,7 @@ from biodance.pipeline.trial_result import Check
 from biodance.report.pages.language import read_language
 from biodance.report.pages.subject import PLAIN_NAMES, subject_page
 from biodance.report.pages.subject_movement import plain_movement
+from biodance.uncertainty.tolerances import shipped
 
 JARGON = ("segment", "inertia", "interval", "marker", "prior", "posterior", "regress", "diagnos", "wrench", "95 %")
 VISIT = '[session]\nlab = "Gait Lab"\noperator = "Ana Ruiz"\ndate = 2026-11-22\n'
@@ -80,6 +83,14 @@ def test_a_phone_gets_a_picture_with_letters_that_can_be_read(result):
     for drawing, shown, least in ((small, 364, 11.0), (wide, 736, 11.0)):
         assert float(drawing.get("font-size")) * shown / float(drawing.get("width")) > least
     assert len(list(small.iter("{http://www.w3.org/2000/svg}text"))) == len(PLAIN_NAMES)
+
+
+def test_the_weight_is_as_uncertain_as_plates_read_wrong(result):
+    gain, standing = shipped().size("plate_gain Fz"), SimpleNamespace(mass=74.0, mass_sd=0.03)
+    low, high = account_for(replace(result, standing=standing)).weight
+    assert (low + high) / 2 == pytest.approx(standing.mass)
+    assert (high - low) / 2 == pytest.approx(1.96 * np.hypot(gain * standing.mass, standing.mass_sd), rel=1e-3)
+    assert high - low > 0.5, "two plates seldom agree better"
 
 
 def test_every_part_has_a_range_or_an_honest_word(result):

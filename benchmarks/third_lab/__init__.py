@@ -1,14 +1,10 @@
 """A third gait laboratory: people, movements, plates and cameras that share no line with what they test.
 
 A clean room. Whoever wrote it had not read the package that it tests, nor the other laboratories: person, mechanics,
-soft tissue, plates and files come from published studies, pinocchio and ezc3d. One command makes a session with its
-truth beside it, the same for the same seed:
-
-    PYTHONPATH=benchmarks python -m benchmarks.third_lab OUT --seed 3 [--fault plate_place] [--set pig|isb|cgm2]
-
-OUT is a session folder (static, stand, six dances, two squats), OUT.truth.json
-holds what is true: masses, centres of mass and inertia per segment, and lumped to the seven kinds of segments that a
-coarser body has; the laboratory; the fault and its size. `third_lab.make_session` does the same from Python.
+soft tissue, plates and files come from published studies, pinocchio and ezc3d. `make_session` makes a session with its
+truth beside it, the same for the same seed: a folder OUT (static, stand, six dances, two squats), and in OUT.truth.json
+what is true: masses, centres of mass and inertia per segment, and lumped to the seven kinds of segments that a coarser
+body has; the laboratory; the fault and its size.
 
 What is unlike usual practice: 22 segments with a spine of three joints, clavicles and toes; a pelvis that has 11 to
 20 % of the body by person; knees that screw home; masses drawn between five studies; soft tissue that wobbles and sags;

@@ -86,12 +86,6 @@ _SCALES = np.block(
 )  # N per N·m and back
 
 
-def still(plate: Plate) -> Plate:
-    """Return the plate without noise and tolerances."""
-    zero = np.zeros(6)
-    return replace(plate, shift=zero[:3], yaw=0.0, response=np.eye(6), offset=zero, noise=0.0, delay=0.0)
-
-
 def spoil_plates(plates: Pair, fault: Fault) -> Pair:
     """Put a fault of the plates into them; other faults leave them as they are."""
     out = []

@@ -12,7 +12,7 @@ from benchmarks.third_lab.faults import Fault, draw_fault
 from benchmarks.third_lab.markers import Places, film, name_markers, place_markers, see
 from benchmarks.third_lab.movement import realize
 from benchmarks.third_lab.people import Person, draw_person
-from benchmarks.third_lab.plates import draw_plates, measure, spoil_plates, still
+from benchmarks.third_lab.plates import draw_plates, measure, spoil_plates
 from benchmarks.third_lab.skeleton import add_mass
 from benchmarks.third_lab.tissue import Tissue, draw_tissue, slide_skin
 from benchmarks.third_lab.trials import DANCES, plan_trial
@@ -26,16 +26,14 @@ TRIALS = (
     ("squat01", "squat"),
     ("squat02", "squat"),
 )  # name, movement
-LENGTHS = {"static01": 4.0, "stand01": 8.0}  # s, of trials that are no dance
+LENGTHS = {"static01": 4.0, "stand01": 8.0}  # s
+USUAL = 10.0  # s, of all other trials
 
 
 def make_session(
     folder: Path,
     seed: int,
     kind: str = "none",
-    marker_set: str = "",
-    seconds: float = 10.0,
-    quiet: bool = False,
     only: tuple[str, ...] = (),
 ) -> Fault:
     """Make a session of one person in one laboratory, with its truth beside it.
@@ -48,12 +46,6 @@ def make_session(
         Person, room, movements. The same with and without a fault.
     kind : str
         "none" or one of FAULTS.
-    marker_set : {"", "pig", "isb", "cgm2"}
-        "" draws one.
-    seconds : float
-        Of each dance.
-    quiet : bool
-        Ideal instruments, skin and tissue: what remains is the mechanics.
     only : tuple of str
         Trials to write; all where empty.
 
@@ -65,14 +57,10 @@ def make_session(
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng([seed, 2026])
     person, tissue = draw_person(rng), draw_tissue(rng)
-    room, plates = _draw_room(rng, marker_set), draw_plates(rng, str(rng.choice(["amti", "kistler"])))
+    room, plates = _draw_room(rng), draw_plates(rng, str(rng.choice(["amti", "kistler"])))
     room = replace(room, make=plates[0].make)
     where, width = place_markers(rng, person), rng.uniform(0.22, 0.32)
     fault = draw_fault(np.random.default_rng([seed, sum(map(ord, kind))]), kind)
-    if quiet:
-        tissue = Tissue({}, {}, 0.0)
-        plates = still(plates[0]), still(plates[1])
-        room = replace(room, camera_noise=0.0, gaps=0.0)
     spoiled = spoil_plates(plates, fault)
     loaded = _load(person, fault)
     leaning = fault.size * np.eye(3)["xyz".index(fault.axis)] if fault.kind == "lab_tilt" else np.zeros(3)
@@ -81,7 +69,7 @@ def make_session(
     for number, (name, movement) in enumerate(TRIALS):
         if only and name not in only:
             continue
-        length = LENGTHS.get(name, seconds)
+        length = LENGTHS.get(name, USUAL)
         own = np.random.default_rng([seed, 7, number])
         plan = plan_trial(own, loaded, movement, length, width)
         path = realize(loaded, plan)
@@ -101,13 +89,13 @@ def make_session(
     return fault
 
 
-def _draw_room(rng: np.random.Generator, marker_set: str) -> Room:
+def _draw_room(rng: np.random.Generator) -> Room:
     """Draw cameras of 0.05 to 0.8 mm, 100 or 120 Hz, axes and marker set."""
     axes, up = ((UP_Z, "z"), (UP_Y, "y"), (np.diag([-1.0, -1.0, 1.0]), "z"))[rng.integers(3)]
     rate, times = ((100.0, 10), (120.0, 10), (200.0, 5))[rng.integers(3)]
     noise = 5e-5 * 16.0 ** rng.uniform()
     drawn = str(rng.choice(["pig", "isb", "cgm2"]))
-    return Room("", axes, up, rate, rate * times, noise, rng.uniform(0, 0.5), marker_set or drawn)
+    return Room("", axes, up, rate, rate * times, noise, rng.uniform(0, 0.5), drawn)
 
 
 def _load(person: Person, fault: Fault) -> Person:

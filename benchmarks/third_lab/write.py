@@ -109,16 +109,6 @@ def write_truth(
     path: Path, person: Person, loaded: Person, room: Room, plates: Sequence[Plate], fault: Fault, **more: object
 ) -> None:
     """Write what is true: person, lumps, room, plates, fault; SI, segment frames in upright standing."""
-
-    def plain(value: object) -> object:
-        return (
-            value.tolist()
-            if isinstance(value, np.ndarray)
-            else float(value)
-            if isinstance(value, np.floating)
-            else value
-        )
-
     truth = {
         "mass_kg": person.mass,
         "height_m": person.height,
@@ -140,7 +130,7 @@ def write_truth(
         "fault": asdict(fault),
         **more,
     }
-    path.write_text(json.dumps(truth, default=plain, indent=1))
+    path.write_text(json.dumps(truth, default=lambda value: np.asarray(value).tolist(), indent=1))
 
 
 def lump(person: Person) -> dict[str, dict[str, object]]:

@@ -55,9 +55,9 @@ def foresee_command(
         tell("foreseeing what the dance will see")
         if out is not None:
             refuse_page(out, force=force)
-        found, one = foresee_dance(dance)
+        found, one, known = foresee_dance(dance)
         seated = any(stance.seat for stance in one.stances)
-        document = foresight_document(found, seated=seated, plates=plate_sentence(one))
+        document = foresight_document(found, seated=seated, plates=plate_sentence(one), known=known)
         if out is not None:
             page = foresight_page(document, f"the dance “{one.protocol}”" if one.protocol else "the dance")
             write_files(out.parent, {out.name: page})

@@ -250,6 +250,8 @@ def live_command(
         body, trial = body_and_stream(
             file, static=static, subject=subject, markers=markers, settings=assignments(chosen), tell=tell
         )
+        if shown:
+            shown.body = body
         found = replay(body, trial, real_time=real_time, tell=tell_state, warn=tell_warning)
         if shown:
             shown.end(found.state, found.cause)

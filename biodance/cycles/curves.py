@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.cycles.cut import PERCENT, Cycle
@@ -12,7 +11,7 @@ from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
 from biodance.motion.soles import Soles
-from biodance.records import SIDES, Array, Motion, Sip, Wrench, freeze
+from biodance.records import SIDES, Array, Mask, Motion, Sip, Wrench, freeze
 from biodance.records.motion import BY_FRAME
 
 _TRAVELS = 0.3
@@ -98,11 +97,17 @@ def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurv
     docs/guide/movement.md says each sign. In a gait cycle bending and rotation of the trunk are seen from the cycle's
     side, as those of the pelvis: its own side down, its own side forwards are positive.
     """
+    motion = _only(motion, cycle.frames(motion.time))
     angle = motion.known_angles
     for j, joint in enumerate(body.joints):
         if (seen := _seen_from(cycle, joint.name)) is not None:
             side, quantity, sign = seen
             yield over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
+
+
+def _only(motion: Motion, frames: slice | Mask) -> Motion:
+    """Return a motion in some of its frames."""
+    return replace(motion, **{name: getattr(motion, name)[frames] for name in BY_FRAME})
 
 
 def _seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
@@ -125,6 +130,7 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     positive: what is left of it when the heel rises is no matter of the toes' line, which then points down. The centre
     of mass: m ahead of where the cycle began, to the side of the foot, over the ground.
     """
+    motion = _only(motion, cycle.frames(motion.time))
     pose, time = poses(body, motion.q), motion.time
     x, y = direction_of(cycle, pose, time)
     frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
@@ -233,7 +239,7 @@ _BEYOND = 0.05  # s before and behind a cycle that are looked at for its first a
 
 
 def load_curves(
-    cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: Mapping[str, Wrench], known: NDArray[np.bool_]
+    cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: Mapping[str, Wrench], known: Mask
 ) -> Iterator[CycleCurve]:
     """Yield the moments (N·m/kg) and powers (W/kg) of a cycle, those of its own side and of the trunk in a gait cycle.
 
@@ -249,7 +255,7 @@ def load_curves(
     y' C y with y = sum(v Y): the axes of a joint are not independent.
     """
     near = (motion.time >= cycle.start - _BEYOND) & (motion.time <= cycle.end + _BEYOND)
-    motion, known = replace(motion, **{name: getattr(motion, name)[near] for name in BY_FRAME}), known[near]
+    motion, known = _only(motion, near), known[near]
     ground = {
         f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))
         for foot, side in enumerate(SIDES)

@@ -208,6 +208,11 @@ class Cycle:
         """Return the times (101,) s of `PERCENT`."""
         return self.start + PERCENT / 100 * self.duration
 
+    def frames(self, time: Array) -> slice:
+        """Return those of the frames at ``time`` (T,) s that its curves hang on: one more on either side."""
+        first, last = np.searchsorted(time, (self.start, self.end), side="right")
+        return slice(max(int(first) - 1, 0), int(last) + 1)
+
 
 _TOUCHES = 0.02
 """s by which a cycle may reach into a span that is left out: its ends are events, known to some frames."""

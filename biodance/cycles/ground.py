@@ -29,25 +29,28 @@ def ground_curves(
     """
     if cycle.side not in SIDES:
         return
-    foot, time, outwards = SIDES.index(cycle.side), motion.time, 1.0 if cycle.side == "right" else -1.0
-    wrench, weight = feet[f"{cycle.side}_foot"].value, STANDARD_GRAVITY * float(body.sip.mass.sum())
-    x, y = direction_of(cycle, poses(body, motion.q), time)
+    foot, outwards, part = SIDES.index(cycle.side), 1.0 if cycle.side == "right" else -1.0, cycle.frames(motion.time)
+    wrench, weight = feet[f"{cycle.side}_foot"].value[part], STANDARD_GRAVITY * float(body.sip.mass.sum())
+    time, told = motion.time[part], known[part, foot]
+    x, y = direction_of(cycle, poses(body, motion.q[part]), time)
     carries = np.where(time > cycle.off, 0.0, 100 / weight)
-    shown = np.where(known[:, foot], carries, np.nan)
+    shown = np.where(told, carries, np.nan)
     inwards = -outwards * (wrench[:, :2] @ [y, -x])
     for name, force in (("forward", wrench[:, :2] @ [x, y]), ("inward", inwards), ("up", wrench[:, 2])):
         yield over_cycle(cycle, f"ground_reaction_{name}", cycle.side, "%", time, shown * force)
-    ahead, aside = _on_sole(body, soles, foot, wrench, threshold=_PRESSES * weight)
-    inside = np.where(known[:, foot], 1.0, np.nan)
+    ahead, aside = _on_sole(body, soles.outline[part], foot, wrench, threshold=_PRESSES * weight)
+    inside = np.where(told, 1.0, np.nan)
     for name, place in (("ahead", ahead), ("outward", outwards * aside)):
         yield over_cycle(cycle, f"pressure_{name}", cycle.side, "m", time, inside * place)
 
 
-def _on_sole(body: Body, soles: Soles, foot: int, wrench: Array, *, threshold: float) -> tuple[Array, Array]:
-    """Return where the pressure lies ahead of the heel along the sole and to the right of that line, (T,) m each."""
-    heel, toe = (place[:, foot, :2] for place in heel_and_toe(body, soles.outline))
+def _on_sole(body: Body, outline: Array, foot: int, wrench: Array, *, threshold: float) -> tuple[Array, Array]:
+    """Return where the pressure lies ahead of the heel along the sole of an ``outline`` (T, 2, P, 3) m and to the right
+    of that line, (T,) m each.
+    """
+    heel, toe = (place[:, foot, :2] for place in heel_and_toe(body, outline))
     along = (toe - heel) / np.linalg.norm(toe - heel, axis=1, keepdims=True)
-    height = soles.outline[:, foot, :, 2].min(axis=1)
+    height = outline[:, foot, :, 2].min(axis=1)
     from_heel = zero_moment_point(wrench, height=height, threshold=threshold)[:, :2] - heel
     ahead = np.einsum("tk,tk->t", from_heel, along)
     return ahead, from_heel[:, 0] * along[:, 1] - from_heel[:, 1] * along[:, 0]

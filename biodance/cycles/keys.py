@@ -40,7 +40,7 @@ _TURNS: Mapping[str, str] = {"ankle": "ankle_dorsiflexion"}
 """Joint -> the angle that tells how fast it turns, where it is not its flexion."""
 
 
-_Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve
+_Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve, or its joint
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,9 @@ def key_values(curves: Sequence[CycleCurve]) -> tuple[KeyValue, ...]:
     A curve of which less than `_KNOWN` is known has none.
     """
     angles = {(one.cycle, one.side, one.quantity): one for one in curves if one.unit == "deg"}
-    spans = {about: _span(one) for about, one in angles.items()}
+    spans: dict[_Curve, dict[str, float]] = {}
+    for (cycle, side, name), one in angles.items():
+        spans.setdefault((cycle, side, name.partition("_")[0]), {})[name] = _span(one)
     found: list[KeyValue] = []
     for one in curves:
         if one.quantity == _OF_STANCE:
@@ -104,14 +106,10 @@ def _span(one: CycleCurve) -> float:
     return float(np.ptp(known)) if known.size else 0.0
 
 
-def _of_angle(one: CycleCurve, spans: Mapping[_Curve, float]) -> Iterator[KeyValue]:
-    joint, span = one.quantity.partition("_")[0], _span(one)
-    others = [
-        size
-        for (cycle, side, name), size in spans.items()
-        if (cycle, side) == (one.cycle, one.side) and name != one.quantity and name.partition("_")[0] == joint
-    ]
-    beside = float(np.linalg.norm(others))
+def _of_angle(one: CycleCurve, spans: Mapping[_Curve, Mapping[str, float]]) -> Iterator[KeyValue]:
+    """Yield its key values; ``spans`` by cycle, side and joint what each angle goes through."""
+    of_joint, span = spans[one.cycle, one.side, one.quantity.partition("_")[0]], _span(one)
+    beside = float(np.linalg.norm([size for name, size in of_joint.items() if name != one.quantity]))
     found = {"maximum": float(np.nanmax(one.value)), "minimum": float(np.nanmin(one.value)), "range": span}
     for key, at in zip(_INSTANTS[one.cycle.kind], (0.0, one.cycle.off_percent), strict=True):
         found[key] = float(np.interp(at, PERCENT, one.value))

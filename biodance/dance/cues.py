@@ -34,6 +34,10 @@ PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
 """Beginnings of the names of the joints of the right and of the left arm."""
+_LIFTED = ("shoulder_flexion", "shoulder_adduction")
+"""Movements whose right angle is shoulder height."""
+REST = "Then rest: let the arms down. Take up this posture again when you are ready."
+"""What is called where the person rests (`rests`)."""
 PLURAL = {"foot": "feet"}
 MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
@@ -56,10 +60,11 @@ def cue_sheet(
     tempo: tuple[float, float] = (2.0, 2.0),
     names: tuple[str, ...] = (),
     about: tuple[str, ...] = (),
+    rests: tuple[bool, ...] = (),
 ) -> str:
     """Return the cue sheet (Markdown): what is ``said`` (P) on the way to each posture (`dance_instructions`), and in
     words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
-    they are known ones; ``about`` sentences that stand before them.
+    they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests.
     """
     move, hold = tempo
     lines = [
@@ -76,7 +81,19 @@ def cue_sheet(
             lines += ["", f"## {stance[:1].upper()}{stance[1:]}"]
         name = f"*{names[i][:1].upper()}{names[i][1:]}.* " if names else ""
         lines += ["", f"**{i + 1}.** {name}{_sentence(called)}"]
+        lines += ["", REST] if rests and rests[i] else []
     return "\n".join(lines) + "\n"
+
+
+def rests(dance: Dance) -> tuple[bool, ...]:
+    """Return whether the person rests after each posture (P): never after one in between, nor after the last one."""
+    out, since = [], 0.0
+    for p in range(len(dance.postures)):
+        since += float(dance.hold[p] + (dance.move[p - 1] if p else 0.0))
+        last = p + 1 == len(dance.postures)
+        out.append(dance.rest is not None and since >= dance.rest and not last and dance.stances[p].over is None)
+        since = 0.0 if out[-1] else since
+    return tuple(out)
 
 
 def calls(
@@ -170,6 +187,13 @@ def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
     return tuple(out)
 
 
+def skipping(dance: Dance, p: int, before: int) -> tuple[str, ...]:
+    """Return what is called on the way to posture ``p`` straight from posture ``before``, on the same feet."""
+    now = dance.stances[p]
+    was, x = (dance.chain.plant(dance.postures[k][None], now.planted, now.ankle)[0] for k in (before, p))
+    return instructions(dance.body, was, x, now, now)
+
+
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
     """Return what the feet do between two stances; a leg that is lifted is told by its joints."""
     if was is None:
@@ -206,7 +230,10 @@ def _call(movement: str, side: str, start: float, angle: float) -> str:
     rounded = _rounded(angle)
     if rounded == 0:
         return none.format(whole)
-    size = "to a right angle" if rounded == 90 else f"by about {rounded:.0f}°"
+    if start * angle > 0 and abs(start) > abs(angle) and rounded == _STEP:
+        return f"{none.format(whole)}, all but about {rounded:.0f}°"
+    high = "to shoulder height" if movement in _LIFTED else "to a right angle"
+    size = high if rounded == 90 else f"by about {rounded:.0f}°"
     only = "only " if start * angle > 0 and abs(start) > abs(angle) else ""  # from a half squat 15° are less, not more
     return f"{(positive if angle > 0 else negative).format(whole)} {only}{size}"
 

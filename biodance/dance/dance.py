@@ -92,6 +92,8 @@ class DanceWords(_Entry):
     mirrored: list[int] = Field([], max_length=MOST_POSTURES)
     plate: tuple[Annotated[float, Field(gt=0, le=_FAR)], Annotated[float, Field(gt=0, le=_FAR)]] | None = None
     unsafe: list[MarginWords] = Field([], max_length=MOST_POSTURES)
+    care: list[str] = Field([], max_length=MOST_POSTURES)
+    rest: float | None = Field(None, gt=0, allow_inf_nan=False)
     stances: list[StanceWords] = Field(max_length=MOST_POSTURES)
     under: list[StanceWords] = Field(max_length=MOST_POSTURES)
 
@@ -169,6 +171,10 @@ class Dance(Sendable):
         Force plate from side to side and ahead, m, on which all feet were set; None any.
     unsafe : tuple of Margin
         Limits of which people who copy it imprecisely leave too little; empty where it is safe, or nobody was asked.
+    care : tuple of str
+        Who stands beside, when to rest, when to stop, in sentences.
+    rest : float or None
+        s of dancing after which the person rests; None at no time.
 
     Examples
     --------
@@ -192,6 +198,8 @@ class Dance(Sendable):
     mirrored: tuple[int, ...] = ()
     plate: tuple[float, float] | None = None
     unsafe: tuple[Margin, ...] = ()
+    care: tuple[str, ...] = ()
+    rest: float | None = None
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -236,6 +244,12 @@ class Dance(Sendable):
     def chain(self) -> Chain:
         """The coordinates in which the dance is written."""
         return _chain_of(self.body)
+
+    @property
+    def mark(self) -> str:
+        """By which a log of a visit knows this dance: eight digits that another dance hardly has."""
+        parts = (self.postures, self.via, self.hold, self.move)
+        return f"{zlib.crc32(b''.join(np.round(part, 6).tobytes() for part in parts)):08x}"
 
     @property
     def duration(self) -> float:
@@ -333,6 +347,7 @@ class Dance(Sendable):
             who = {name: getattr(self.subject, name) for name in _PERSON}
             words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
+        words |= {"care": self.care, "rest": self.rest}
         words["unsafe"] = [asdict(margin) for margin in self.unsafe]
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
@@ -376,9 +391,9 @@ class Dance(Sendable):
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
             who = Subject(**words["subject"]) if words.get("subject") else None
-            more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
+            more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored", "care")}
             more["unsafe"] = tuple(Margin(**margin) for margin in words.get("unsafe", ()))
-            more["plate"] = words.get("plate")
+            more |= {name: words.get(name) for name in ("plate", "rest")}
             return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). {_GIVE}") from error

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.visit_log import VisitLog
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information
 from biodance.identification.knowledge import segment_quantities
@@ -246,6 +247,8 @@ class PerformanceScore:
         The transitions whose repetition would gain most together, best first.
     seconds : float
         Recorded and used, s.
+    logs : tuple of VisitLog
+        What the page of the dance noted meanwhile (`visit_log`), where its files lie beside the recordings.
 
     Examples
     --------
@@ -258,6 +261,7 @@ class PerformanceScore:
     excitation: tuple[SegmentExcitation, ...]
     repetitions: tuple[Repetition, ...]
     seconds: float
+    logs: tuple[VisitLog, ...] = ()
 
     def __repr__(self) -> str:
         planned, reached = (np.mean([getattr(one, name) for one in self.excitation]) for name in ("planned", "reached"))

@@ -89,7 +89,14 @@ class ObservedEvidence:
 
         ``effect``, ``target`` and ``parameters`` as in the family of effects, of others than the ``causes``, too.
         """
-        return _columns(self.recorded, self.observations, effect, target, parameters)
+        key = effect, target, tuple(parameters)
+        if key not in self._columns:
+            self._columns[key] = _columns(self.recorded, self.observations, *key)
+        return self._columns[key]
+
+    @cached_property
+    def _columns(self) -> dict[tuple[str, str, tuple[str, ...]], Array]:
+        return {}
 
     @cached_property
     def norms(self) -> tuple[str, ...]:

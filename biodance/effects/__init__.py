@@ -22,7 +22,6 @@ from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.transient import Transient
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.errors import UnknownName
-from biodance.records import Session
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
 __all__ = [
@@ -107,14 +106,13 @@ def effect(name: str) -> Effect:
     return family[name]
 
 
-def check_quality(
-    session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None
-) -> tuple[QualityCheck, ...]:
+def check_quality(recorded: Recorded, *, chosen: Chosen[Cause | type[Cause]] = None) -> tuple[QualityCheck, ...]:
     """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects
     (`causes`).
     """
-    recorded = Recorded(session, cases)
     found = [
-        replace(quality, advice=kind.advice) for kind in causes(chosen).values() for quality in kind.check(recorded)
+        replace(quality, advice=kind.advice)
+        for kind in causes(chosen).values()
+        for quality in recorded.once(kind.check)
     ]
     return tuple(sorted(found, key=lambda quality: quality.ok))

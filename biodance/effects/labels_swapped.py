@@ -54,7 +54,7 @@ class LabelsSwapped(DiscreteEffect):
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the pairs that the markers show, each with one sentence for all pairs that are exchanged alike."""
-        found = named_exchanges(recorded.session, exchanges(recorded))
+        found = named_exchanges(recorded.session, recorded.once(exchanges))
         looked = any(trial.markers is not None for trial in recorded.session.trials)
         return found or (
             (QualityCheck(_CHECK, True, "No two markers seem to carry each other's names."),) if looked else ()

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import permutations
 
 import numpy as np
@@ -64,7 +65,7 @@ class Hypothesis:
         K, size = self.columns.X.shape[1], self.fit.coefficients
         return np.asarray(self.surety * (self.y - self.columns.X @ size[:K] - self.Z @ size[K:]))
 
-    @property
+    @cached_property
     def coefficients(self) -> Array:
         """(P,) posterior mean per unit of `Rows.X`."""
         return np.asarray(self.columns.turn @ self.fit.coefficients[: self.columns.X.shape[1]])

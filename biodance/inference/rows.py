@@ -9,6 +9,7 @@ tolerances; the scales ``lambda`` and ``s`` say how far this session is from the
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,10 +117,20 @@ class Rows:
 
     def slopes(self, effect: Effect, theta: Array) -> Array:
         """Return (r, p): derivative of `added` at ``theta`` (p,)."""
+        if effect.linear and effect in self._slopes:
+            return self._slopes[effect]
         simulated = np.zeros((0, theta.size))
         if self.problem is not None:
             simulated = self.white(slopes(self.problem, effect, theta, of=effect.removed))
-        return np.concatenate([simulated, self.observed(effect)])
+        found = np.concatenate([simulated, self.observed(effect)])
+        if effect.linear:
+            self._slopes[effect] = found
+        return found
+
+    @cached_property
+    def _slopes(self) -> dict[Effect, Array]:
+        """Those of linear causes, the same at every size."""
+        return {}
 
     def observed(self, effect: Effect) -> Array:
         """Return (n, p): what one unit of each parameter adds to the observations, in units of their own standard

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
@@ -20,7 +21,7 @@ from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, rows_of, with_observed
-from biodance.inference.scales import bare, fit, nominal, prior_sd
+from biodance.inference.scales import fit, nominal, prior_sd, products
 from biodance.inference.sets import Search, hypothesis, infer
 from biodance.inference.unknown import with_unknown
 from biodance.records import Array, Sip
@@ -191,11 +192,17 @@ def _turned(
     push then; () where none is more probable than all signs as they are.
     """
     counting, found = evidence.counting, []
+    as_they_are: dict[bytes, tuple[VisibleColumns, float]] = {}
     for name, turned in counting.sign_reversed.items():
         here = np.isfinite(turned)
         if not here.any():
             continue
-        as_is, other = (_log_evidence(counting, here, values, known, causes) for values in (None, turned))
+        if (key := here.tobytes()) not in as_they_are:
+            columns = _observed_alone(counting, here, known, causes)
+            as_they_are[key] = columns, _log_evidence(columns, columns.rows.y)
+        columns, as_is = as_they_are[key]
+        own = np.array([one.sd for one in counting.observations])
+        other = _log_evidence(columns, (turned / own)[here])
         found.append((other - as_is + np.log(_SIGN / (1 - _SIGN) / len(counting.sign_reversed)), name))
     if not found:
         return ()
@@ -211,22 +218,21 @@ def _turned(
     return (Finding(*name, (), alike, 1.0, advice=advice, probability=probability, kind=asked[name[0]]),)
 
 
-def _log_evidence(
-    evidence: ObservedEvidence,
-    here: np.ndarray,
-    values: np.ndarray | None,
-    known: Tolerances,
-    causes: Sequence[Candidate],
-) -> float:
-    """Return the log evidence of some observations without any cause, with other ``values`` minus expectation."""
-    kept = [one for one, there in zip(evidence.observations, here, strict=True) if there]
-    if values is not None:
-        kept = [replace(one, value=one.expected + v) for one, v in zip(kept, values[here], strict=True)]
+def _observed_alone(
+    evidence: ObservedEvidence, here: NDArray[np.bool_], known: Tolerances, causes: Sequence[Candidate]
+) -> VisibleColumns:
+    """Return the columns that are no fault of some observations, without any simulation."""
     some = replace(
         evidence,
-        observations=tuple(kept),
+        observations=tuple(one for one, there in zip(evidence.observations, here, strict=True) if there),
         sensitivities={n: t[here] for n, t in evidence.sensitivities.items()},
         sign_reversed={},
     )
-    rows = rows_of(None, causes, known, some, everywhere=True)
-    return fit(bare(VisibleColumns.of(rows)), prior_sd(rows), nominal(rows)).log_evidence
+    return VisibleColumns.of(rows_of(None, causes, known, some, everywhere=True))
+
+
+def _log_evidence(columns: VisibleColumns, y: Array) -> float:
+    """Return the log evidence of a target ``y`` (r,) without any cause."""
+    rows = columns.rows
+    found = products(columns, np.empty((len(y), 0)), y, np.ones(rows.noises + 1))
+    return fit(found, prior_sd(rows), nominal(rows)).log_evidence

@@ -271,8 +271,9 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
     if one.Z.shape[1]:
         cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
     half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
+    heard, sizes = _told_by_outliers(left[r:], search.Z[r:, [cut.start for cut in search.cuts]])
     scored = []
-    for cause, cut in zip(search.causes, search.cuts, strict=True):
+    for cause, cut, told, size in zip(search.causes, search.cuts, heard, sizes, strict=True):
         if cause.names in one.names:
             continue
         Z = search.Z[:, cut]
@@ -281,9 +282,8 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
         inner = np.linalg.inv(np.eye(len(s)) + G)
         mean = inner @ s
         value = 0.5 * float(s @ mean) + 0.5 * float(np.linalg.slogdet(inner)[1])
-        heard, size = _told_by_outliers(left[r:], Z[r:, 0]) if len(s) else (-np.inf, 0.0)
-        if heard > value:
-            value, mean = heard, np.append(size, np.zeros(len(s) - 1))
+        if told > value:
+            value, mean = float(told), np.append(size, np.zeros(len(s) - 1))
         tried = [(value, cause.start(mean)), *_at_sizes(search, one, cause.effect)]
         value, begin = max(tried, key=lambda pair: pair[0])
         scored.append(Scored(cause.effect, value + search.prior[cause.names], begin))
@@ -304,13 +304,14 @@ def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[flo
     return out
 
 
-def _told_by_outliers(left: Array, z: Array) -> tuple[float, float]:
-    """Return what a cause with one column ``z`` (n,) gains where it explains observations that are outliers without it
-    (``left`` (n,)), whose weights say nothing of it; and its size. Laplace, all else as it is.
+def _told_by_outliers(left: Array, z: Array) -> tuple[Array, Array]:
+    """Return what each cause with one column of ``z`` (n, k) gains (k,) where it explains observations that are
+    outliers without it (``left`` (n,)), whose weights say nothing of it; and its size (k,). Laplace, all else as it is.
     """
-    size, weight = 0.0, np.ones(len(left))
+    size, weight = np.zeros(z.shape[1]), np.ones(z.shape)
     for _ in range(_ROUNDS):
-        size = float((weight * z) @ left / (1 + (weight * z) @ z))
-        weight = (TAIL + 1) / (TAIL + (left - z * size) ** 2)
-    gained = np.log1p(left**2 / TAIL) - np.log1p((left - z * size) ** 2 / TAIL)
-    return float(0.5 * (TAIL + 1) * gained.sum() - 0.5 * size**2 - 0.5 * np.log1p((weight * z) @ z)), size
+        size = left @ (weight * z) / (1 + (weight * z**2).sum(axis=0))
+        weight = (TAIL + 1) / (TAIL + (left[:, None] - z * size) ** 2)
+    gained = np.log1p(left**2 / TAIL)[:, None] - np.log1p((left[:, None] - z * size) ** 2 / TAIL)
+    told = 0.5 * (TAIL + 1) * gained.sum(axis=0) - 0.5 * size**2
+    return told - 0.5 * np.log1p((weight * z**2).sum(axis=0)), size

@@ -138,11 +138,12 @@ def distance_to_hull(point: Array, points: Array) -> Array:
     angle = np.sort(np.arctan2(towards[..., 1], towards[..., 0]), axis=1)
     widest = np.max(np.diff(angle, axis=1, append=angle[:, :1] + 2 * np.pi), axis=1)
     distance = np.zeros(len(point))
-    for row in np.flatnonzero(widest > np.pi):
-        i, j = np.triu_indices(points.shape[1], k=1)
-        start, chord = towards[row, i], towards[row, j] - towards[row, i]
-        along = np.clip(-np.sum(chord * start, axis=1) / np.maximum(np.sum(chord**2, axis=1), 1e-18), 0, 1)[:, None]
-        distance[row] = np.linalg.norm(start + along * chord, axis=1).min()
+    outside, (i, j) = np.flatnonzero(widest > np.pi), np.triu_indices(points.shape[1], k=1)
+    for rows in np.split(outside, range(_BLOCK, len(outside), _BLOCK)):
+        start = towards[rows][:, i]
+        chord = towards[rows][:, j] - start
+        along = np.clip(-np.sum(chord * start, axis=2) / np.maximum(np.sum(chord**2, axis=2), 1e-18), 0, 1)
+        distance[rows] = np.linalg.norm(start + along[..., None] * chord, axis=2).min(axis=1)
     return distance
 
 

@@ -25,7 +25,7 @@ from biodance.lab.corrections import (
     joined_corrections,
 )
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.judged_trials import all_windows, cases_of
+from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import MendedCopy, SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Session, Trial
@@ -103,13 +103,18 @@ def _said_of(trial: Trial) -> Iterator[str]:
 
 
 def with_right_labels(
-    result: SessionResult, *, reference: SessionIdentification | None = None, tell: Callable[[str], None]
+    result: SessionResult,
+    recorded: Recorded,
+    *,
+    reference: SessionIdentification | None = None,
+    tell: Callable[[str], None],
 ) -> MendedCopy | None:
-    """Return the session examined again with those labels exchanged that carry each other's names; None where none do.
+    """Return the session, ``recorded`` as checks see it, examined again with those labels exchanged that carry each
+    other's names; None where none do.
 
     Proven before it is kept: a trial that the body follows clearly worse with other names (`WORSE`) keeps its own.
     """
-    found = exchanges(Recorded(result.session, cases_of(result.body, all_windows(result.trials))))
+    found = recorded.once(exchanges)
     while found:
         tell("examining a copy with the labels exchanged")
         trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
@@ -150,21 +155,22 @@ _Cause = Effect | DiscreteEffect
 
 def with_faults_undone(
     result: SessionResult,
+    recorded: Recorded,
     mended: MendedCopy | None,
     chosen: Mapping[str, _Cause],
     *,
     reference: SessionIdentification | None,
     tell: Callable[[str], None],
-) -> MendedCopy | None:
-    """Return a copy of the session examined again without what the checks of the ``chosen`` causes find and can undo
-    (`Checked.undone`), beside what was ``mended`` already; that, if there is none.
+) -> tuple[MendedCopy | None, Recorded]:
+    """Return a copy of the session, as checks see it ``recorded``, examined again without what the checks of the
+    ``chosen`` causes find and can undo (`Checked.undone`), beside what was ``mended`` already; that, if there is none;
+    and what the checks see of it.
     """
     undoing = [kind for kind in chosen.values() if kind.undoes()]
     found: list[QualityCheck] = []
     for _ in range(_ROUNDS):
-        recorded = Recorded(result.session, cases_of(result.body, all_windows(result.trials)))
         known = {(one.effect, one.target, one.trials) for one in found}
-        failed = [(kind, one) for kind in undoing for one in kind.check(recorded) if not one.ok]
+        failed = [(kind, one) for kind in undoing for one in recorded.once(kind.check) if not one.ok]
         failed = [pair for pair in failed if any(_undone(t, [pair]) is not t for t in result.session.trials)]
         new = [(kind, one) for kind, one in failed if (one.effect, one.target, one.trials) not in known]
         if not new:
@@ -172,11 +178,14 @@ def with_faults_undone(
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        result = examine(replace(result.session, trials=trials), reference=reference, known=result.known)
+        result = examine(
+            replace(result.session, trials=trials), reference=reference, known=result.known, earlier=result
+        )
+        recorded = recorded_of(result)
     if not found:
-        return mended
+        return mended, recorded
     exchanged, checks = (mended.exchanged, mended.checks) if mended else ({}, ())
-    return MendedCopy(result, exchanged, (*checks, *found))
+    return MendedCopy(result, exchanged, (*checks, *found)), recorded
 
 
 def _undone(trial: Trial, found: Iterable[tuple[_Cause, QualityCheck]]) -> Trial:

@@ -97,7 +97,8 @@ def make_dance(
         reason = str(error)
     counted = expected = freely = None
     if dance is not None:
-        dance = replace(dance, plate=plan.plate, subject=subject)
+        rest = plan.rest if np.isfinite(plan.rest) else None
+        dance = replace(dance, plate=plan.plate, subject=subject, care=plan.care, rest=rest)
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)

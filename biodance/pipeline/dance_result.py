@@ -9,7 +9,7 @@ import numpy as np
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import Expectation
+from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import ForImprecise, family
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.feet import room_in_words, room_on_plates
@@ -250,9 +250,9 @@ TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
 
-def foresee_dance(path: Path) -> tuple["Foresight", Dance]:
-    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, and
-    the dance.
+def foresee_dance(path: Path) -> tuple["Foresight", Dance, Expectation | None]:
+    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, the
+    dance, and what it teaches of a person's masses (None of a robot's).
 
     Raises
     ------
@@ -262,4 +262,5 @@ def foresee_dance(path: Path) -> tuple["Foresight", Dance]:
     from biodance.diagnosis.foresight import foresee, session_of
 
     dance = Dance.load(path)
-    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS)), dance
+    known = expect(dance, steps=1) if dance.body.markers.names else None
+    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS)), dance, known

@@ -14,7 +14,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.discovery import Chosen
-from biodance.effects import Cause, DiscreteEffect, Effect, causes, check_quality
+from biodance.effects import Cause, DiscreteEffect, Effect, Recorded, causes, check_quality
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
@@ -26,7 +26,7 @@ from biodance.pipeline.accepted import with_faults_undone, with_right_labels
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, with_proven_corrections
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
-from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
+from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out, recorded_of
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
 from biodance.pipeline.results import SessionResult
@@ -66,10 +66,14 @@ def diagnose_session(
     """
     tell("looking for faults too large for statistics")
     family = _suspects(effects, result)
-    right = with_right_labels(result, reference=reference, tell=tell) if LabelsSwapped.name in family else None
-    mended = with_faults_undone(right.result if right else result, right, family, reference=reference, tell=tell)
+    recorded, right = recorded_of(result), None
+    if LabelsSwapped.name in family:
+        right = with_right_labels(result, recorded, reference=reference, tell=tell)
+    if right is not None:
+        result, recorded = right.result, recorded_of(right.result)
+    mended, recorded = with_faults_undone(result, recorded, right, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result
-    found = _judged(result, family, reference=reference, tolerances=tolerances, tell=tell)
+    found = _judged(result, recorded, family, reference=reference, tolerances=tolerances, tell=tell)
     whole = of_family(found.diagnosis, family)
     cases = found.inferred.search.rows.problem.cases if found.inferred and found.inferred.search.rows.problem else ()
     if cases:
@@ -102,6 +106,7 @@ def _load_of(result: SessionResult, whole: Diagnosis) -> LoadSearch | None:
 
 def _judged(
     result: SessionResult,
+    recorded: Recorded,
     asked: Mapping[str, Cause],
     *,
     reference: SessionIdentification | None,
@@ -111,7 +116,7 @@ def _judged(
     """Return what was found; `reconcile_with_checks` says it."""
     fitted = chosen_windows(result.trials)
     tell("checking units, signs, labels and clocks")
-    checks = check_quality(result.session, cases_of(result.body, all_windows(result.trials)), chosen=asked)
+    checks = check_quality(recorded, chosen=asked)
     failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
     tell("observing feet on plates, clocks, weights")
     known = tolerances or shipped()

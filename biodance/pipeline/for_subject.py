@@ -12,10 +12,12 @@ from biodance.body.body import Body
 from biodance.cycles.summary import Repetitions
 from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.lab.session.file import VisitEntry, read_session_file
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.records import Subject
+from biodance.uncertainty.tolerances import shipped
 
 WHY_STOPPED, WHY_NOTHING, WHY_IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
 WHY_DOUBTED, WHY_FAULTY = "doubts about the body", "something wrong in the recording"
@@ -75,14 +77,21 @@ def account_for(
         return SubjectAccount(result.subject, visit, withheld=withheld, body=result.body, moved=moved)
     one, standing = result.identification.identification, result.standing
     masses = tuple(_part(known) for known in one.known if known.quantity == "mass")
-    reach = SIGMAS * standing.mass_sd if standing else 0.0
-    weight = (standing.mass - reach, standing.mass + reach) if standing else SubjectAccount.weight
+    weight = _weight(standing) if standing else SubjectAccount.weight
     sums = known_together(one.sip)
     together = None
     if sums and not masses[0].measured:
         pair, reach = sums[0], SIGMAS * sums[0].sd
         together = PartMass(pair.segments, pair.mass - reach, pair.mass + reach)
     return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body, moved=moved)
+
+
+def _weight(standing: QuietStanding) -> tuple[float, float]:
+    """Return the 95 % interval, kg, of who stands still: plates sway with the person, and read a little wrong
+    throughout.
+    """
+    reach = SIGMAS * float(np.hypot(standing.mass_sd, standing.mass * shipped().size("plate_gain Fz")))
+    return standing.mass - reach, standing.mass + reach
 
 
 def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tuple[str, ...]:

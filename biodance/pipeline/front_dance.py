@@ -267,17 +267,19 @@ def virtual_subject(
 
 
 def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "PerformanceScore":
-    """Return how well a dance was danced in the trials with role fit of an examined visit.
+    """Return how well a dance was danced in the trials with role fit of an examined visit, and what the page that led
+    noted (`dance_log*.json` in its folder).
 
     Raises
     ------
     FileRefused
-        The file is no dance.
+        The file is no dance, or a log is none.
     BiodanceError
         The dance is of another body, or nothing was recorded.
     """
     from biodance.dance.dance import Dance
     from biodance.dance.expectation import score_performance
+    from biodance.dance.visit_log import read_visit_logs
     from biodance.pipeline.identification import FITTED_ROLES
     from biodance.pipeline.trial_result import trial_fit
 
@@ -285,4 +287,5 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     if result.body is None:
         raise SessionRefused(f"{result.session.folder}: {result.body_source} So nobody knows how the dance was danced.")
     fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
-    return score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
+    scored = score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
+    return replace(scored, logs=read_visit_logs(Path(result.session.folder), one))

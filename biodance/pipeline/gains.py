@@ -96,7 +96,7 @@ def with_proven_corrections(
         corrections = accepted_corrections(own, f"session {result.session.folder.name}")
         subject = reduce(lambda who, one: one.cause.declared(who, one.target), own, base.session.subject)
         session = replace(base.session, subject=subject)
-        base = examine(session, reference=reference, known=result.known, corrections=corrections)
+        base = examine(session, reference=reference, known=result.known, corrections=corrections, earlier=base)
     if not (undone or own) or base.identification is None:
         return result
     return replace(base, identification=replace(base.identification, corrected=(*undone, *own)))

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.effects import Case, QualityCheck, check_quality
+from biodance.effects import Case, QualityCheck, Recorded, check_quality
 from biodance.lab.markers.time_axis import of_postures
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
@@ -63,12 +63,17 @@ def cases_of(body: Body | None, found: tuple[TrialWindow, ...]) -> tuple[Case, .
     return () if body is None else tuple(window.case(body, body.sip.phi) for window in found)
 
 
+def recorded_of(result: SessionResult) -> Recorded:
+    """Return what the checks look at in an examined session."""
+    return Recorded(result.session, cases_of(result.body, all_windows(result.trials)))
+
+
 def failed_checks(result: SessionResult) -> tuple[QualityCheck, ...]:
     """Return the checks of the recordings (units, signs, labels, clocks) that failed; trials without plates are looked
     at by their markers alone.
     """
     measured = tuple(window for window in all_windows(result.trials) if window.trial.plates)
-    checks = check_quality(result.session, cases_of(result.body, measured))
+    checks = check_quality(Recorded(result.session, cases_of(result.body, measured)))
     return tuple(quality for quality in checks if not quality.ok)
 
 

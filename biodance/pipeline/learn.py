@@ -18,7 +18,7 @@ from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
 from biodance.diagnosis.own_tolerances import skin_of, soft_tissue
 from biodance.diagnosis.problem import problem
-from biodance.effects import check_quality
+from biodance.effects import Recorded, check_quality
 from biodance.errors import SessionRefused, UnknownName
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
@@ -177,7 +177,9 @@ def learned_session(result: SessionResult) -> LearnedSession:
     windows, session = chosen_windows(result.trials), result.session
     if result.body is None or not windows:
         raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
-    if failed := [quality for quality in check_quality(session, cases_of(result.body, windows)) if not quality.ok]:
+    if failed := [
+        quality for quality in check_quality(Recorded(session, cases_of(result.body, windows))) if not quality.ok
+    ]:
         raise SessionRefused(
             f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
         )

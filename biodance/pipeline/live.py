@@ -33,6 +33,7 @@ from biodance.motion.dynamics import regressor
 from biodance.motion.ik.inverse_kinematics import Follower
 from biodance.motion.soles import soles_from_body
 from biodance.motion.track import smooth, upright_trunk
+from biodance.pipeline.asked import asked_words
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.caution import widened_prior
@@ -48,13 +49,14 @@ _SLOW = 10.0
 @dataclass(frozen=True, eq=False)
 class LiveState:
     """What an operator sees: ``time`` s, ``verdicts`` segment -> how well its mass is known, ``suspect`` what is
-    wrong now, in words, and ``advice`` what to do next.
+    wrong now, in words, ``advice`` what to do next, and ``asked`` the segment that it is about ("" none).
     """
 
     time: float
     verdicts: Mapping[str, Knowability]
     suspect: tuple[str, ...]
     advice: str
+    asked: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +167,7 @@ class LiveSession:
     def state(self) -> LiveState:
         """Return what is known, suspect and to be done now."""
         verdicts = dict(self.posterior.verdicts())
-        return LiveState(self._now, verdicts, self._watch.suspect, self._advice(verdicts))
+        return LiveState(self._now, verdicts, self._watch.suspect, *self._advice(verdicts))
 
     def finish(self, frame_s: Array, wall_s: Array) -> LiveResult:
         """Take in what the filter still held back, and return all that was found."""
@@ -262,9 +264,10 @@ class LiveSession:
         about = self._standing_point if self._pressure[3] else np.zeros(3)
         return believable(self.body, fit, about)[0].use
 
-    def _advice(self, verdicts: Mapping[str, Knowability]) -> str:
+    def _advice(self, verdicts: Mapping[str, Knowability]) -> tuple[str, str]:
+        """Return what to do next, and the segment that becomes better known by it."""
         if self._watch.suspect:
-            return "Mend what is suspect first: frames do not count until then."
+            return "Mend what is suspect first: frames do not count until then.", ""
         rows = np.diag(self.posterior.covariance)[::10] / np.maximum(
             np.diag(self.posterior.prior.covariance)[::10], 1e-12
         )
@@ -272,8 +275,8 @@ class LiveSession:
         standing = {names[foot.segment] for foot in self.body.feet.values()}
         open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:
-            return "All masses but those of the feet are known well enough: the session can end."
-        return f"Move the {display.spaced(names[open_[0]])} further and faster, both feet on the plates."
+            return "All masses but those of the feet are known well enough: the session can end.", ""
+        return asked_words(names[open_[0]]), names[open_[0]]
 
     def _fit(self) -> Fit | None:
         """Return all frames that were taken in as one trial."""

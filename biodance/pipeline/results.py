@@ -23,6 +23,7 @@ from biodance.inference.decision import Inferred
 from biodance.lab.corrections import PlateCorrection
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.placed import Placed
 from biodance.pipeline.trial_result import Check, ShownJoints, Step, Still, TrialResult, Weighing
 from biodance.records import Session, Sip, Subject, by_name
 from biodance.records.attention import WARNING
@@ -70,6 +71,8 @@ class SessionResult:
         The body of an earlier session that it started from; None for the table's.
     corrections : tuple of PlateCorrection
         What was taken off the plates of ``session`` before all stages.
+    placed : Placed or None
+        How the body came about, for another examination of the same markers.
 
     Examples
     --------
@@ -95,6 +98,7 @@ class SessionResult:
     shown_joints: ShownJoints = field(default_factory=ShownJoints)
     known: Body | None = None
     corrections: tuple[PlateCorrection, ...] = ()
+    placed: Placed | None = None
 
     def __repr__(self) -> str:
         return (

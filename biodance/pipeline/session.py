@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import repeat
+
+import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
@@ -10,6 +13,7 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.limbs import with_declared_limbs
 from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.corrections import PlateCorrection, corrected_trial
+from biodance.motion.contact import carried_elsewhere
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh, with_weighed_mass
@@ -21,11 +25,12 @@ from biodance.pipeline.identification import (
     identify_trials,
     predicted,
 )
+from biodance.pipeline.placed import Placed
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
-from biodance.records import Session
+from biodance.records import Mask, Motion, Session
 from biodance.threads import one_thread
 
 
@@ -48,17 +53,76 @@ def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[TrialResul
 
 
 def _examined(
-    read: tuple[TrialResult, ...], body: Body | None, mass: float, tell: Callable[[str], None]
+    read: tuple[TrialResult, ...],
+    body: Body | None,
+    mass: float,
+    followed: tuple[Motion | None, ...],
+    tell: Callable[[str], None],
 ) -> tuple[TrialResult, ...]:
-    """Return the trials tracked and compared, with their checks; those that Ctrl-C left undone say so."""
+    """Return the trials tracked, where they are not ``followed`` already, and compared, with their checks; those that
+    Ctrl-C left undone say so.
+    """
     results: list[TrialResult] = []
     try:
-        for k, one in enumerate(read, 1):
+        for k, (one, motion) in enumerate(zip(read, followed, strict=True), 1):
             tell(f"tracking {one.trial.name}, {k} of {len(read)}")
-            results.append(examine_trial(one, body, mass=mass))
+            results.append(examine_trial(one, body, mass=mass, followed=motion))
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
     return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
+
+
+def _placed(
+    session: Session,
+    read: tuple[TrialResult, ...],
+    known: Body | None,
+    earlier: tuple[Placed, tuple[TrialResult, ...]] | None,
+) -> Placed:
+    """Return who moves in the prepared trials ``read`` of a session; the body of an ``earlier`` examination where its
+    trials have the same markers, and nothing else carries in other frames.
+
+    Raises
+    ------
+    SessionRefused
+        The ``known`` body is of another person.
+    """
+    subject = session.subject
+    hidden = tuple(_hidden(one, subject.mass) for one in read)
+    if earlier is not None and earlier[0].holds((subject, known, hidden)) and _same_markers(read, earlier[1]):
+        return earlier[0]
+    steps: list[Step] = []
+    body, source = body_of(subject, read, session.settings, steps)
+    prior = None
+    if body is not None and known is not None:
+        body, prior, source = starting_from(known, body, subject.mass, source)
+    elif body is not None:
+        body, limbs = with_declared_limbs(body, subject)
+        source = f"{source} {limbs}".strip()
+    plain, shown = body, ShownJoints()
+    if body is not None:
+        body, shown = shown_joints(body, read, steps)
+    return Placed(subject, known, hidden, body, plain, source, prior, shown, tuple(steps))
+
+
+def _hidden(one: TrialResult, mass: float) -> Mask:
+    trial = one.trial
+    if not one.usable or trial.markers is None or not trial.plates:
+        return np.zeros(0, dtype=bool)
+    return carried_elsewhere(trial, weight=trial.settings.gravity * mass)
+
+
+def _same_markers(some: tuple[TrialResult, ...], others: tuple[TrialResult, ...]) -> bool:
+    """Return whether the trials of two examinations have equal markers."""
+    for one, other in zip(some, others, strict=True):
+        ours, theirs = one.trial.markers, other.trial.markers
+        if ours is None or theirs is None:
+            if ours is not theirs:
+                return False
+        elif ours.names != theirs.names or not all(
+            np.array_equal(*pair, equal_nan=True) for pair in ((ours.time, theirs.time), (ours.xyz, theirs.xyz))
+        ):
+            return False
+    return True
 
 
 @one_thread()
@@ -68,6 +132,7 @@ def examine(
     reference: SessionIdentification | None = None,
     known: Body | None = None,
     corrections: tuple[PlateCorrection, ...] = (),
+    earlier: SessionResult | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
     """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the
@@ -86,6 +151,9 @@ def examine(
         before, not the table's. Lengths and joints are measured anew.
     corrections : tuple of PlateCorrection
         Faults of the plates to take off first; what is not known of their sizes counts in every interval.
+    earlier : SessionResult, optional
+        The same session examined with its plates as they were: what only markers tell is taken from there, where they
+        are the same.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -118,21 +186,16 @@ def examine(
     steps: list[Step] = []
     read = _prepared(session, tell)
     tell("scaling the body")
-    body, source = body_of(session.subject, read, session.settings, steps)
+    before = earlier.placed if earlier is not None else None
+    placed = _placed(session, read, known, (before, earlier.trials) if before and earlier else None)
+    body, prior, shown = placed.body, placed.prior, placed.shown
     if body is not None and reference is not None:
         refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
-    prior = None
-    if body is not None and known is not None:
-        body, prior, source = starting_from(known, body, session.subject.mass, source)
-    elif body is not None:
-        body, limbs = with_declared_limbs(body, session.subject)
-        source = f"{source} {limbs}".strip()
-    plain, shown = body, ShownJoints()
-    if body is not None:
-        body, shown = shown_joints(body, read, steps)
-    done = _examined(read, body, session.subject.mass, tell)
-    if body is not None and plain is not None:
-        body, shown = with_forces(shown, plain, body, done)
+    followed = (one.motion for one in earlier.trials) if earlier and placed is before else repeat(None, len(read))
+    done = _examined(read, body, session.subject.mass, tuple(followed), tell)
+    if body is not None and placed.plain is not None:
+        body, shown = with_forces(shown, placed.plain, body, done)
+    steps += placed.steps
     standing = best_standing(done)
     weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
     identification, limits = None, session.settings.checks
@@ -158,7 +221,7 @@ def examine(
         session=session,
         subject=session.subject,
         body=body,
-        body_source=source,
+        body_source=placed.source,
         steps=tuple(steps),
         trials=done,
         checks=checks,
@@ -171,6 +234,7 @@ def examine(
         shown_joints=shown,
         known=known,
         corrections=corrections,
+        placed=placed,
     )
 
 

@@ -3,6 +3,7 @@ sits.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from biodance.pipeline.trial_result import Still, TrialResult
 from biodance.records import Array, Motion, side_in_name
 
 
-def _parents(body: Body) -> list[int]:
+def parent_segments(body: Body) -> list[int]:
     """Return for every segment the segment it hangs on; -1 for the root's."""
     parents = []
     for joint in body.segment_joint:
@@ -46,7 +47,7 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a
     bar joins; beyond its children, or without any, to the end of its box. Only the trunk reaches beyond its children.
     """
-    parents, place = _parents(body), pose.position
+    parents, place = parent_segments(body), pose.position
     lines: list[tuple[Array, Array, str]] = []
     for i, segment in enumerate(body.segments):
         start, children = place[:, i], [j for j, parent in enumerate(parents) if parent == i]
@@ -64,6 +65,12 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     return np.stack([np.stack(line[:2], axis=1) for line in lines], axis=1), tuple(line[2] for line in lines)
 
 
+@lru_cache(maxsize=64)
+def _solid_points(box: bytes) -> Array:
+    """Return the points (V, 3) m of the solid that fills a box (2, 3) m, given by its bytes."""
+    return np.asarray(box_solid(np.frombuffer(box).reshape(2, 3)).vertices)
+
+
 def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[str, Array, float]]:
     """Return the parts of a body in the posture ``q`` (nq,) as seen from the horizontal direction ``eye``: segment,
     outline (n, 2) m, across and up, and how near it is, m.
@@ -74,7 +81,7 @@ def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[st
     toward = np.array([*eye, 0.0])
     seen = np.array([[-eye[1], eye[0], 0.0], [0.0, 0.0, 1.0]])
     for segment, box in shape_parts(body):
-        points = np.asarray(box_solid(box).vertices) @ pose.rotation[0, segment].T + pose.position[0, segment]
+        points = _solid_points(box.tobytes()) @ pose.rotation[0, segment].T + pose.position[0, segment]
         flat = points @ seen.T
         out.append((body.segments[segment], flat[ConvexHull(flat).vertices], float((points @ toward).mean())))
     return out

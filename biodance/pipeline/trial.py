@@ -168,15 +168,16 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
     return track(body, trial)
 
 
-def examine_trial(read: TrialResult, body: Body | None, *, mass: float) -> TrialResult:
-    """Take a prepared trial (`prepare_trial`) through the remaining steps; ``mass`` kg of the body, NaN = unknown.
+def examine_trial(read: TrialResult, body: Body | None, *, mass: float, followed: Motion | None = None) -> TrialResult:
+    """Take a prepared trial (`prepare_trial`) through the remaining steps; ``mass`` kg of the body, NaN = unknown;
+    ``followed`` the motion of the body where it has followed these markers before.
 
     What has no markers or no body is not tracked, what has no plates is not compared: each is a step with its reason.
     """
     if not read.usable:
         return read
     trial, steps = filtered_as_it_asks(read, body), list(read.steps)
-    motion = attempt(steps, "track", lambda: track_trial(trial, body))
+    motion = attempt(steps, "track", lambda: followed if followed is not None else track_trial(trial, body))
     groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
     fit = marker_fit(motion, groups) if motion else None
     if not trial.plates:

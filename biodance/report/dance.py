@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from biodance.body.body import Body
-from biodance.dance.cues import cue_sheet, dance_instructions
+from biodance.dance.cues import REST, cue_sheet, dance_instructions, rests
 from biodance.dance.dance import Dance
 from biodance.dance.playback import Rehearsal
 from biodance.dance.problem.feet import room_on_plates
@@ -70,27 +70,32 @@ def cards_page(result: DanceResult) -> str:
 
     dance = result.dance
     assert dance is not None
-    postures, cues = held_postures(dance).q, []
+    postures, cues, pauses = held_postures(dance).q, [], rests(dance)
     for p, (said, stance) in enumerate(zip(dance_instructions(dance), dance.stances, strict=True)):
         name, feet = dance.names[p] if dance.names else "posture", stance_words(stance)
         title = f"{p + 1}. {name}, {feet}"
         picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title))))
-        cues.append(
-            {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said, "picture": picture}
-        )
+        called = {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said}
+        cues.append(called | {"picture": picture, "rest": REST if pauses[p] else ""})
     return render(
         "cues.html.j2",
         name=dance.protocol,
         count=len(cues),
-        minutes=f"{dance.duration / 60:.1f} minutes",
+        minutes=_minutes(dance.duration),
         move=f"{float(np.median(dance.move)):g}",
         hold=f"{float(np.max(dance.hold)):g}",
         about=result.about,
+        care=dance.care,
         unsafe=not_safe(dance),
         right="blue",
         left="orange",
         cues=cues,
     )
+
+
+def _minutes(seconds: float) -> str:
+    """Return a duration as it is said: "about a minute", "about 2 minutes"."""
+    return "about a minute" if seconds < 90 else f"about {seconds / 60:.0f} minutes"
 
 
 MARGIN_ROW = Schema(
@@ -235,7 +240,8 @@ def _leading(result: DanceResult, dance: Dance, folder: Path) -> dict[str, str]:
         tuple(stance_words(s) for s in dance.stances),
         tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
         names=dance.names,
-        about=(*not_safe(dance), *result.about),
+        about=(*not_safe(dance), *dance.care, *result.about),
+        rests=rests(dance),
     )
     return {"cues.md": cues, "cues.html": cards_page(result)}
 

@@ -5,6 +5,7 @@ printed, and the document for programs.
 import json
 import sys
 from collections.abc import Mapping
+from html import escape as escape_html
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from threading import Event, Lock, Thread
@@ -15,10 +16,13 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
+from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.display import cause_in_words, spaced
 from biodance.errors import BiodanceError
+from biodance.pipeline.asked import asked_posture
 from biodance.pipeline.live import LiveResult, LiveState
+from biodance.report.dance import mannequin_svg
 from biodance.report.tables.identification import ASKED
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_table
@@ -105,7 +109,8 @@ class _Server(ThreadingHTTPServer):
 
 
 class LivePage:
-    """A page at ``address`` that shows the newest state of a stream; a context, closed at its end.
+    """A page at ``address`` that shows the newest state of a stream; a context, closed at its end. Once it knows the
+    ``body`` it draws what is asked, too.
 
     Parameters
     ----------
@@ -121,6 +126,9 @@ class LivePage:
     def __init__(self, port: int = 0) -> None:
         self._lock, self._fetched, self._watched = Lock(), Event(), False
         self._said: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
+        self._said["picture"] = ""
+        self._pictures: dict[str, str] = {}
+        self.body: Body | None = None
         try:
             self._server = _Server((_LOOPBACK, port), self._handler())
         except (OSError, OverflowError) as error:
@@ -132,7 +140,17 @@ class LivePage:
 
     def show(self, state: LiveState) -> None:
         """Show what is known, suspect and to be done now."""
-        self._tell(time_s=state.time, known=dict(state.verdicts), suspect=list(state.suspect), next=state.advice)
+        known, suspect = dict(state.verdicts), list(state.suspect)
+        self._tell(time_s=state.time, known=known, suspect=suspect, next=state.advice, picture=self._picture(state))
+
+    def _picture(self, state: LiveState) -> str:
+        """Return the picture of what is asked, drawn once a segment."""
+        if self.body is None or not state.asked:
+            return ""
+        if state.asked not in self._pictures:
+            drawn = mannequin_svg(self.body, asked_posture(self.body, state.asked), escape_html(state.advice))
+            self._pictures[state.asked] = drawn
+        return self._pictures[state.asked]
 
     def warn(self, said: LiveWarning) -> None:
         """Add a warning."""

@@ -16,8 +16,8 @@ from biodance.doctor import MachineFinding
 from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
-from biodance.report.tables.diagnosis import LIMIT_ROW
-from biodance.report.tables.identification import SEGMENT_ROW
+from biodance.report.tables.diagnosis import FIRST, seen_causes
+from biodance.report.tables.identification import SEGMENT_ROW, log_in_words
 from biodance.report.tables.schema import Row, Schema, shown
 from biodance.report.tables.session import TRIAL_ROW
 from biodance.report.wording import causes_by_effect, format_number, parted_gain, sizes_in_words, trial_and_subject
@@ -162,24 +162,29 @@ def _print_performance(found: Row, console: Console) -> None:
     print_line(console, f"dance {found['dance']}, share of the table's variance removed, reached (planned):")
     for row in found["excitation"]:
         print_line(console, shown("  {segment}: {reached:%0} % ({planned:%0} %)", row))
+    for row in found["logs"]:
+        print_line(console, f"log: {log_in_words(row)}")
     for row in found["repetitions"]:
         cues = f"repeat: cue {row['transition']} to {row['transition'] + 1}"
         print_line(console, shown(cues + " (+{gain:%2} % in the mean, most in {most})", row))
 
 
 def print_foresight(found: Row, console: Console) -> None:
-    """Print what a movement will see, what it will confuse, and what it cannot see, of `biodance foresee`."""
-    print_table(LIMIT_ROW, found["limits"], console)
+    """Print what a movement will see, what it will confuse, what it cannot see and what to change first, of `biodance
+    foresee`.
+    """
+    for sentence in filter(None, (found["summary"], found["learned"], found["plates"], found["care"])):
+        print_line(console, sentence)
+    print_line(console, f"will see: {causes_by_effect(seen_causes(found)) or 'nothing of what it looks for'}")
+    hidden = causes_by_effect((row["effect"], row["target"]) for row in found["unobservable"])
+    print_line(console, f"cannot see: {hidden or 'nothing of what it looks for'}")
     for pair in found["confusions"]:
         if pair["log_bayes_factor"] is None or pair["log_bayes_factor"] < 3:
             print_line(console, f"will confuse: {cause_in_words(pair['cause'])} with {cause_in_words(pair['other'])}")
-    hidden = causes_by_effect((row["effect"], row["target"]) for row in found["unobservable"])
-    print_line(console, f"cannot see: {hidden or 'nothing of what it looks for'}")
-    for sentence in filter(None, (found["summary"], found["plates"], found["care"])):
-        print_line(console, sentence)
-    for one in found["changes"]:
+    for one in found["changes"][:FIRST]:
         count = len({*one["unseen"], *one["confused"]})
         print_line(console, f"to change: {one['do']} ({count} cause{'s' * (count != 1)})")
+    print_line(console, "Every cause and change: --out PAGE.html, or --json.")
 
 
 def _print_accepted(found: Row, console: Console) -> None:

@@ -13,8 +13,9 @@ from biodance.body.body import Body
 from biodance.body.parts import JointLimits
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
-from biodance.dance.problem.plan import Plan, finite_number, table
+from biodance.dance.problem.plan import LEAST_REST, Plan
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
+from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 from biodance.records import SIDES
@@ -48,7 +49,8 @@ class PersonLimits:
     0..1); ``max_speed`` rad/s; ``stand_alone_on`` the legs on which the person may stand alone; ``seated`` True where
     standing is not possible; ``holds`` the hands that stay on a frame; ``reason`` in words; ``bearing`` (side, share of
     the weight that this leg may bear); ``hands_low`` True where no hand may come over shoulder height; ``seat_height``
-    m, 0 any. Keys: see `read_person`.
+    m, 0 any; ``care`` sentences for cards and page; ``rest`` s of dancing after which the person rests. Keys: see
+    `read_person`.
     """
 
     ranges: tuple[tuple[str, float, float], ...] = ()
@@ -62,6 +64,8 @@ class PersonLimits:
     bearing: Shares = ()
     hands_low: bool = False
     seat_height: float = 0.0
+    care: tuple[str, ...] = ()
+    rest: float = math.inf
 
     @property
     def alone(self) -> tuple[str, ...]:
@@ -96,6 +100,7 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
     limits, corrected = _possible(body, limit_body(body, person), plan, person)
     notes += corrected
     plan = replace(plan, blocks=kept, alone=person.alone, holds=person.holds, careful=person != HEALTHY)
+    plan = replace(plan, care=(*plan.care, *person.care), rest=min(plan.rest, person.rest))
     if plan.seated and person.seat_height:
         least = seat(body).seat - SEAT_TO_HIP
         if person.seat_height < least:
@@ -252,7 +257,8 @@ def _check_range(body: Body, joint: int, low: float, high: float) -> None:
 
 
 _TABLES = ("at_most_deg", "weight_bearing", "strength", "range_share", "range_deg")
-_KEYS = ("reason", "cannot", "hold_frame", "max_speed_deg_s", "seat_height_m", "stand_alone_on", "seated", *_TABLES)
+_WORDS = ("reason", "care", "cannot", "hold_frame", "stand_alone_on", "seated")
+_KEYS = (*_WORDS, "max_speed_deg_s", "seat_height_m", "rest_after_s", *_TABLES)
 _OVERHEAD = "lift arms over shoulder height"
 _CANNOT = ("stand", *(f"stand on {side} leg" for side in SIDES), "turn", _OVERHEAD)
 _RIGHT_ANGLE = math.pi / 2
@@ -308,6 +314,8 @@ def read_person(path: str | Path) -> PersonLimits:
         hold_frame = ["right"]                    hands that stay on the grips of a walking frame, of rails or bars
         max_speed_deg_s = 120                     no joint turns faster
         seat_height_m = 0.60                      of the stool; the feet hang
+        rest_after_s = 30                         s of dancing after which the person rests: heart, breath, pain
+        care = ["Stop when the shoulder hurts."]  sentences for cards and page
         stand_alone_on = ["right"]                legs on which the person may stand alone; [] = never; without it: both
         seated = false                            true: only protocols on a stool (cannot = ["stand"])
 
@@ -370,6 +378,8 @@ def read_person(path: str | Path) -> PersonLimits:
         bearing,
         _OVERHEAD in cannot,
         _positive(path, raw, "seat_height_m", 0.0, legal=_SEAT),
+        sentences(path, raw),
+        _positive(path, raw, "rest_after_s", math.inf, legal=(LEAST_REST, math.inf)),
     )
 
 

@@ -7,6 +7,7 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
     name = "short"
     description = "what it is for, one sentence"
     for = "for whom, in words"
+    care = ["who stands beside", "when to stop"]   sentences on cards and page
     move_s = 2.0                 seconds from posture to posture
     hold_s = 1.5                 seconds of standing still in each
     forward_m = 0.2              how far the right foot stands in front in "right_forward"
@@ -15,6 +16,7 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
     free = false                 true: any posture, any number of instructions (the paper's); simplicity is 0 then
     simplicity = 1.0             the performer's term: 0 = excitation only; 1 = an instruction costs half a second
                                  (free: a simple dance is worth as much as an exciting one)
+    rest_after_s = 25            of dancing after which the person rests
     budget_s = 115               of free ones: those that inform most per second are danced until the time is used up
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
@@ -42,7 +44,6 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
 Only [postures] is needed; everything else has the value of the paper or none.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -53,6 +54,7 @@ import numpy as np
 from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
@@ -63,6 +65,8 @@ LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
 """Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
 USUAL_PLATE = (0.40, 0.60)
 """m from side to side and ahead: the commonest force plate (AMTI BP400600, Kistler 9281), long side ahead."""
+LEAST_REST = 10.0
+"""s of dancing, at least, before a rest."""
 _PLATE = (0.2, 3.0)
 """m that a side of a plate, or of several that touch, may have."""
 _BRIEF = 1.0
@@ -85,7 +89,8 @@ class Plan:
     words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached
     without effort, or all that a healthy joint allows (the paper); ``slower`` times that it takes as long as the
     protocol says, whose seconds must be legal: of robots; ``seat_height`` m of a person's own stool, 0 any; ``careful``
-    of people with limits of their own: words that they can do nowhere are named; ``hanging`` arms.
+    of people with limits of their own: words that they can do nowhere are named; ``hanging`` arms; ``care`` sentences
+    about helpers, rests and when to stop; ``rest`` s of dancing after which the person rests.
     """
 
     name: str
@@ -112,6 +117,8 @@ class Plan:
     seat_height: float = 0.0
     careful: bool = False
     hanging: tuple[str, ...] = ()
+    care: tuple[str, ...] = ()
+    rest: float = float("inf")
     limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:
@@ -135,6 +142,7 @@ class Plan:
             ("forward", LEAST_FORWARD, 0.4, "m"),
             ("simplicity", 0.0, 100.0, ""),
             ("instructions", 2.0, float("inf"), ""),
+            ("rest", LEAST_REST * self.slower, float("inf"), "s"),
             ("wide", LEAST_WIDE, 1.5, "times the usual distance"),
         ):
             value = getattr(self, name)
@@ -195,6 +203,7 @@ _NUMBERS = {
     "instructions": "instructions",
     "wide": "wide",
     "other_weight": "other_weight",
+    "rest_after_s": "rest",
 }
 """Key of the file: field of the Plan."""
 _SHORT = {"share_of_support": ("balance", "share")}
@@ -204,7 +213,7 @@ _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
 FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
-_WORDS = ("name", "description", "postures", "limits", "weights", "ranges", "for", "plate_m")
+_WORDS = ("name", "description", "postures", "limits", "weights", "ranges", "for", "plate_m", "care")
 _KEYS = (*_WORDS, *_NUMBERS, *_SHORT, *_FLAGS)
 
 
@@ -234,6 +243,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
         | {"plate": _plate(path, raw["plate_m"]) if "plate_m" in raw else USUAL_PLATE}
         | flags
         | words
+        | {"care": sentences(path, raw)}
         | {field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw}
     )
     counts = table(path, raw, "postures")
@@ -283,18 +293,3 @@ def _limits(path: Path, raw: dict[str, Any], usual: dict[str, dict[str, float]])
         if short in raw:
             found.setdefault(name, {})[key] = finite_number(path, short, raw[short])
     return limits_with(found, where=str(path))
-
-
-def finite_number(path: Path, where: str, value: object) -> float:
-    """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise BiodanceError(f"{path}: {where} = {value!r}; expected a finite number.")
-    return float(value)
-
-
-def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[str, Any]:
-    """Return a table of a TOML file, empty if it is missing; BiodanceError if it is something else."""
-    value = raw.get(key, {})
-    if not isinstance(value, dict):
-        raise BiodanceError(f"{path}: [{of}{key}] must be a table, found {value!r}.")
-    return value

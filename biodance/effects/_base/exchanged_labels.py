@@ -3,7 +3,7 @@ cannot tell (left or right, front or back, thumb or not), pelvis, trunk and fing
 contradicts.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
@@ -122,21 +122,21 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
     """Return the pairs that explain most if exchanged together, and when; () where none do, or others explain it
     nearly as well.
     """
-    every = np.arange(markers.time.size)
-    named = {one: one.misfit(markers, {}, every) for one in groups}
+    every = _misfits(markers, np.arange(markers.time.size))
+    named = {one: every(one, {}) for one in groups}
     wrong = [one for one in groups if np.sum(named[one] > len(one.labels) * _MISFIT**2) >= LEAST_EXCHANGED]
     if not wrong:
         return (), ()
     worst = np.argsort(np.max([np.nan_to_num(named[one]) for one in wrong], axis=0))[-_SOME:]
-    frames = np.union1d(worst, np.linspace(0, markers.time.size - 1, _SOME).astype(int))
+    some = _misfits(markers, np.union1d(worst, np.linspace(0, markers.time.size - 1, _SOME).astype(int)))
     gains = {}
     for pairs in _candidates(markers, groups, wrong):
-        better, _, gain = _explained(markers, groups, pairs, frames)
+        better, _, gain = _explained(some, groups, pairs)
         if better.sum() >= LEAST_EXCHANGED:
             gains[pairs] = float(gain[better].sum() - 2 * len(pairs) * _NOISE**2 * better.sum())
     possible = {}
     for pairs in sorted(gains, key=lambda pairs: -gains[pairs]):
-        better, told, _ = _explained(markers, groups, pairs, every)
+        better, told, _ = _explained(every, groups, pairs)
         if spans := exchange_spans(markers, pairs, better, told):
             possible[pairs] = spans
     if not possible:
@@ -151,7 +151,7 @@ def _better(markers: Markers, groups: tuple[RigidGroup, ...], best: tuple[Pair, 
     touches, where the best one explains something.
     """
     frames = np.linspace(0, markers.time.size - 1, 4 * _SOME).astype(int)
-    better, _, _ = _explained(markers, groups, best, frames)
+    better, _, _ = _explained(_misfits(markers, frames), groups, best)
     labels = {*_other_names(best), *_other_names(other)}
     touched = [one for one in groups if labels & set(one.labels)]
     left = [
@@ -182,16 +182,32 @@ def _candidates(
                 yield pairs
 
 
-def _explained(
-    markers: Markers, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...], frames: Index
-) -> tuple[Mask, Mask, Array]:
-    """Return in which of the ``frames`` the groups that ``pairs`` touch fit clearly better with these exchanged (n,),
-    where that can be told (n,), and by how many m² (n,).
+_Misfit = Callable[[RigidGroup, Mapping[str, str]], Array]
+
+
+def _misfits(markers: Markers, frames: Index) -> _Misfit:
+    """Return `RigidGroup.misfit` in some ``frames``, computed once for every order of the labels of a group: most
+    candidates share them.
+    """
+    known: dict[tuple[RigidGroup, tuple[str, ...]], Array] = {}
+
+    def misfit(group: RigidGroup, other: Mapping[str, str]) -> Array:
+        key = group, tuple(other.get(label, label) for label in group.labels)
+        if key not in known:
+            known[key] = group.misfit(markers, other, frames)
+        return known[key]
+
+    return misfit
+
+
+def _explained(misfit: _Misfit, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]) -> tuple[Mask, Mask, Array]:
+    """Return in which frames of a ``misfit`` the groups that ``pairs`` touch fit clearly better with these exchanged
+    (n,), where that can be told (n,), and by how many m² (n,).
     """
     other = _other_names(pairs)
     touched = [one for one in groups if other.keys() & set(one.labels)]
-    named = np.sum([one.misfit(markers, {}, frames) for one in touched], axis=0)
-    right = np.sum([one.misfit(markers, other, frames) for one in touched], axis=0)
+    named = np.sum([misfit(one, {}) for one in touched], axis=0)
+    right = np.sum([misfit(one, other) for one in touched], axis=0)
     told = np.isfinite(named) & np.isfinite(right)
     with np.errstate(invalid="ignore"):
         better = (right < _BETTER * named) & (named > sum(len(one.labels) for one in touched) * _MISFIT**2)

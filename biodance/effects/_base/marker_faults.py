@@ -13,10 +13,9 @@ def marker_checks(recorded: Recorded, fault: MarkerFault, effect: str) -> tuple[
     has it. Preparing a trial takes these frames out (`prepare`), so the rest is judged.
     """
     found: dict[str, list[tuple[FaultyMarker, str]]] = {}
-    trials = [trial for trial in recorded.session.trials if trial.markers is not None]
-    for trial in trials:
-        markers = _worn(trial)
-        for one in faulty_markers(markers):
+    trials = recorded.once(_faulty)
+    for trial, markers, faults in trials:
+        for one in faults:
             if one.fault is fault:
                 found.setdefault(one.label, []).append((one, f"{trial.name} {one.when(markers.time)}"))
     check = f"{fault.value} markers"
@@ -25,6 +24,12 @@ def marker_checks(recorded: Recorded, fault: MarkerFault, effect: str) -> tuple[
     return tuple(
         QualityCheck(check, False, _said(places), effect, label, mended=True) for label, places in found.items()
     )
+
+
+def _faulty(recorded: Recorded) -> list[tuple[Trial, Markers, tuple[FaultyMarker, ...]]]:
+    """Return the trials that have markers, with those of its set and their faults of every kind."""
+    trials = [(trial, _worn(trial)) for trial in recorded.session.trials if trial.markers is not None]
+    return [(trial, markers, faulty_markers(markers)) for trial, markers in trials]
 
 
 def _worn(trial: Trial) -> Markers:

@@ -21,20 +21,23 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving
     point.
     """
-    w, (numerators, denominator) = 2 * np.pi * frequency, _filters(rate, frequency, damping)
+    w, (numerators, denominator, rest) = 2 * np.pi * frequency, _filters(rate, frequency, damping)
     place, speed = (
-        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
-        for b in numerators
+        lfilter(b, denominator, acceleration, axis=0, zi=zi[:, None] * acceleration[:1])[0]
+        for b, zi in zip(numerators, rest, strict=True)
     )
     return place, -acceleration - w * w * place - 2 * damping * w * speed
 
 
 @lru_cache(maxsize=64)
-def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Array]:
-    """Return numerators (2, 3), of place and speed, and their denominator (3,): the free mass, sampled."""
+def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Array, list[Array]]:
+    """Return numerators (2, 3), of place and speed, their denominator (3,), and the states in which both are at rest
+    under a constant acceleration of 1: the free mass, sampled.
+    """
     w = 2 * np.pi * frequency
     system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
-    return ss2tf(*cont2discrete(system, 1 / rate, method="foh")[:4])
+    numerators, denominator = ss2tf(*cont2discrete(system, 1 / rate, method="foh")[:4])
+    return numerators, denominator, [lfilter_zi(b, denominator) for b in numerators]
 
 
 def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:

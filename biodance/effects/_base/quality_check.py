@@ -4,10 +4,10 @@ fitted.
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, TypeVar, cast
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quantity import Quantity
@@ -44,6 +44,9 @@ class QualityCheck:
         return not self.trials or trial.name in self.trials
 
 
+_Found = TypeVar("_Found")
+
+
 @dataclass(frozen=True, eq=False)
 class Recorded:
     """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be
@@ -60,6 +63,16 @@ class Recorded:
         mass = float("nan") if "mass" in subject.guessed else subject.mass
         told = {trial.name: newton_of(trial, mass=mass) for trial in self.session.trials if trial.plates}
         return {name: one for name, one in told.items() if one is not None}
+
+    def once(self, look: "Callable[[Recorded], _Found]") -> "_Found":
+        """Return what a ``look`` at this finds, looked at once however often it is asked for."""
+        if look not in self._found:
+            self._found[look] = look(self)
+        return cast("_Found", self._found[look])
+
+    @cached_property
+    def _found(self) -> dict[object, object]:
+        return {}
 
 
 class Checked:

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.records import Array, Markers, Mask, Trial, any_coordinate, longest_run, runs
+from biodance.records import Array, Markers, Mask, Trial, any_coordinate, lengths_of, longest_run, runs
 from biodance.spatial import rigid_fit
 
 _REPEATS = 5
@@ -196,10 +196,9 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
         way = weight[0] * a + weight[1] * b + weight[2] * c + weight[3] * d
         line = b + (k + 1) / (frames + 1) * (c - b)
         for expected in (line, np.where(np.isnan(way), line, way)):
-            least = np.minimum(least, np.linalg.norm(xyz[2 + k : 2 + k + count] - expected, axis=-1))
+            least = np.minimum(least, lengths_of(xyz[2 + k : 2 + k + count] - expected))
     forth, back = (
-        np.linalg.norm(near + (frames + 1) * (near - far) - other, axis=-1)
-        for near, far, other in ((b, a, c), (c, d, b))
+        lengths_of(near + (frames + 1) * (near - far) - other) for near, far, other in ((b, a, c), (c, d, b))
     )
     with np.errstate(invalid="ignore"):
         off[2 : 2 + count] = np.where(least > np.fmin(forth, back), least, 0.0)

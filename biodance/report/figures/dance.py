@@ -9,8 +9,8 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, spaced
 from biodance.motion.kinematics import poses
-from biodance.pipeline.still import bone_lines
-from biodance.records import Array
+from biodance.pipeline.still import bone_lines, silhouettes
+from biodance.records import Array, side_in_name
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
 
 if TYPE_CHECKING:
@@ -149,15 +149,21 @@ def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) 
     axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linestyle=style, linewidth=0.9, label=label)
 
 
-_RATE = 12.5
+_RATE = 25.0
 """Pictures per second."""
-_SIZE, _FLOOR = (420, 480), 440
+_SIZE, _FLOOR = (290, 480), 450
 """Of one view, px; row of the floor."""
-_SCALE = 190.0
-"""px per metre."""
-_VIEWS = ((0, 1.0, "from the right"), (1, 1.0, "from the front"))
-"""Lab axis to the right of the picture, its sign, and the title of each view."""
-_INK = {"planned": (190, 190, 190), "right": (0, 114, 178), "left": (213, 94, 0), "middle": (60, 60, 60)}
+_SCALE = 170.0
+"""px per metre of a person's height."""
+_TALL = 1.75
+"""m: bodies are drawn as large as if they were so tall."""
+_VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
+"""Title and horizontal direction of the eye."""
+_FINE = 2
+"""Times as fine a picture is drawn before it is made smaller, so that edges are smooth."""
+_INK = {"right": (0, 114, 178), "left": (213, 94, 0), "middle": (110, 120, 130)}
+_PALE = 0.55
+"""Share of white in the colours of the plan."""
 _FORMATS = (".gif", ".mp4")
 
 
@@ -185,8 +191,10 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / _RATE)))
     plan = found.dance.motion(played.wrench.rate).q[rows]
     cop = played.wrench.cop()[rows]
+    height = max(float(outline[:, 1].max()) for _, outline, _ in silhouettes(body, plan[0], _VIEWS[0][1]))
+    scale = _SCALE * _TALL / max(height, 0.2)
     frames = [
-        _picture(body, planned, real, point, float(t))
+        _picture(body, (("planned", planned), ("played", real)), point, float(t), scale)
         for planned, real, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)
     ]
     with whole_file(out, over=True) as part:
@@ -196,37 +204,60 @@ def write_film(found: Rehearsal, out: Path) -> Path:
 
 def _write(frames: "list[Image]", part: Path, out: Path) -> None:
     """Write pictures as the film ``out`` under the name ``part``."""
+    from PIL import Image
+
     if out.suffix.lower() == ".gif":
-        small = [frame.quantize(16) for frame in frames]
+        colours = frames[0].quantize(48)
+        small = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
         small[0].save(part, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
         return
     words = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += ["-s", f"{2 * _SIZE[0]}x{_SIZE[1]}", "-r", str(_RATE), "-i", "-", "-pix_fmt", "yuv420p", str(part)]
+    words += [
+        "-s",
+        f"{frames[0].width}x{frames[0].height}",
+        "-r",
+        str(_RATE),
+        "-i",
+        "-",
+        "-pix_fmt",
+        "yuv420p",
+        str(part),
+    ]
     done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
     if done.returncode:
         raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")
 
 
-def _picture(body: Body, planned: Array, played: Array, cop: Array, time: float) -> "Image":
-    """Return both views of one instant: the plan in grey, the played body in colour, the centre of pressure in red."""
+def _picture(body: Body, bodies: tuple[tuple[str, Array], ...], cop: Array, time: float, scale: float) -> "Image":
+    """Return one instant: the bodies (title, posture (nq,)) side by side, each from the front and from the right, the
+    first one, the plan, in pale colours; the centre of pressure in red; ``scale`` px per metre.
+    """
     from PIL import Image, ImageDraw
 
-    image = Image.new("RGB", (2 * _SIZE[0], _SIZE[1]), "white")
-    draw = ImageDraw.Draw(image)
-    draw.text((10, 8), f"{time:5.1f} s", fill="black")
-    for number, (axis, sign, title) in enumerate(_VIEWS):
-        left = number * _SIZE[0]
-        draw.text((left + 10, 24), title, fill="black")
-        draw.line([(left + 10, _FLOOR), (left + _SIZE[0] - 10, _FLOOR)], fill=(120, 120, 120), width=2)
+    width, height = _SIZE[0] * _FINE, _SIZE[1] * _FINE
+    image = Image.new("RGB", (width * len(bodies) * len(_VIEWS), height), "white")
+    draw, left = ImageDraw.Draw(image), 0
+    for title, q in bodies:
+        for view, eye in _VIEWS:
+            middle, across = left + width / 2, np.array([-eye[1], eye[0]])
 
-        def at(point: Array, *, left: int = left, axis: int = axis, sign: float = sign) -> tuple[float, float]:
-            return left + _SIZE[0] / 2 + sign * _SCALE * float(point[axis]), _FLOOR - _SCALE * float(point[2])
+            def at(u: float, z: float, *, middle: float = middle) -> tuple[float, float]:
+                return middle + _FINE * scale * u, _FINE * (_FLOOR - scale * z)
 
-        for q, real in ((planned, False), (played, True)):
-            lines, sides = bone_lines(body, poses(body, q))
-            for (a, b), side in zip(lines[0], sides, strict=True):
-                draw.line([at(a), at(b)], fill=_INK[side if real else "planned"], width=4 if real else 7)
-        if np.isfinite(cop).all():
-            x, y = at(cop)
-            draw.ellipse([x - 5, y - 5, x + 5, y + 5], fill=(204, 0, 0))
-    return image
+            draw.line([(left + 16, at(0, 0)[1]), (left + width - 16, at(0, 0)[1])], fill=(120, 120, 120), width=4)
+            for segment, outline, _ in sorted(silhouettes(body, q, eye), key=lambda one: one[2]):
+                draw.polygon([at(u, z) for u, z in outline], fill=_ink(segment, title == bodies[0][0]), outline="white")
+            if title != bodies[0][0] and np.isfinite(cop).all():
+                x, y = at(float(cop[:2] @ across), 0.0)
+                draw.ellipse([x - 8, y - 8, x + 8, y + 8], fill=(204, 0, 0))
+            draw.text((left + 16, 16), f"{title}, {view}", fill="black", font_size=26)
+            left += width
+    draw.text((16, 50), f"{time:5.1f} s", fill="black", font_size=26)
+    return image.reduce(_FINE)
+
+
+def _ink(segment: str, planned: bool) -> tuple[int, int, int]:
+    """Return the colour of a segment, paler for the plan."""
+    ink = _INK[side_in_name(segment)]
+    red, green, blue = (round(one + _PALE * (255 - one)) if planned else one for one in ink)
+    return red, green, blue

@@ -32,7 +32,15 @@ from biodance.report.figures.vector import (
     segments,
 )
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.diagnosis import CONFUSION_ROW, LIMIT_ROW, OBSERVED_ROW, VISIBILITY_ROW, observed_rows
+from biodance.report.tables.diagnosis import (
+    CONFUSION_ROW,
+    FIRST,
+    LIMIT_ROW,
+    OBSERVED_ROW,
+    VISIBILITY_ROW,
+    observed_rows,
+    seen_causes,
+)
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import (
     NEVER,
@@ -284,5 +292,8 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         version=__version__,
         created=now(),
         schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
+        first=FIRST,
+        seen=causes_by_effect(seen_causes(document)),
+        hidden=causes_by_effect((row["effect"], row["target"]) for row in document["unobservable"]),
         some=lambda causes: causes_by_effect(cause.partition(" ")[::2] for cause in causes),
     )

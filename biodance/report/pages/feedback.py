@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.solids import segment_solids
-from biodance.dance.cues import dance_instructions
+from biodance.dance.cues import dance_instructions, rests, skipping
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
 from biodance.dance.problem.feet import plate_corners
@@ -20,6 +20,7 @@ from biodance.display import spaced
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import not_safe
+from biodance.pipeline.still import parent_segments
 from biodance.records import SIDES, Array, side_in_name
 from biodance.report.files import refuse_page, write_files
 from biodance.report.pages.template import render, script_json, template_text, three_js
@@ -123,17 +124,18 @@ def scene_of(dance: Dance) -> dict[str, Any]:
         ``name``, ``duration_s``, ``rate_hz``, ``frames``; ``segments`` with ``name``, ``side``, ``vertices`` (V, 3)
         float32 m in the segment's frame and ``faces`` (F, 3) uint16; ``poses`` (frames, segments, 7) int16: position in
         0.1 mm of the lab, z up, and quaternion x, y, z, w in steps of 1/32767; arrays little-endian in base64;
-        ``plate`` (4, 2) m corners of the plate for which it was made, else of a square about the feet; ``cues``, one a
-        posture (`_cues`).
+        ``parent`` the segment (its number here) that carries it, -1 none; ``plate`` (4, 2) m corners of the plate for
+        which it was made, else of a square about the feet; ``cues``, one a posture (`_cues`); ``mark`` by which a log
+        of a visit knows the dance, ``still`` what is said during a hold.
 
     Raises
     ------
     BiodanceError
         The dance leaves the room of 3.2 m about the lab origin that the page can show.
     """
-    solids = segment_solids(dance.body)
-    motion = dance.motion(_RATE)
-    pose = poses(dance.body, motion.q)
+    body, solids = dance.body, segment_solids(dance.body)
+    motion, parents = dance.motion(_RATE), parent_segments(body)
+    pose = poses(body, motion.q)
     chosen = [k for k, name in enumerate(dance.body.segments) if name in solids]
     place = _FACTOR * pose.position[:, chosen]
     if not np.abs(place).max() < 32767:
@@ -151,23 +153,28 @@ def scene_of(dance: Dance) -> dict[str, Any]:
             {
                 "name": name,
                 "side": side_in_name(name, ""),
+                "parent": chosen.index(parents[k]) if parents[k] in chosen else -1,
                 "vertices": _packed(solids[name].vertices),
                 "faces": _packed(solids[name].faces, "<u2"),
             }
-            for name in (dance.body.segments[k] for k in chosen)
+            for k, name in ((k, body.segments[k]) for k in chosen)
         ],
         "poses": _packed(placed, "<i2"),
         "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4),
+        "mark": dance.mark,
+        "still": "Sit still" if any(stance.seat for stance in dance.stances) else "Stand still",
         "cues": _cues(dance),
     }
 
 
 def _cues(dance: Dance) -> list[dict[str, Any]]:
     """Return of every posture: ``number`` as on the cue sheet, ``move_s`` when to begin to move, ``hold_s`` from when
-    and ``end_s`` until when to stand still, ``calls`` what to do, ``stance`` in words, ``feet``
-    the outlines of the planted soles (P, 2) m.
+    and ``end_s`` until when to stand still, ``calls`` what to do, ``after_skips`` the same where one, two, three
+    postures before it are left out (as far as the feet stay where they are), ``can_half`` whether half of the way to it
+    is a posture, too, ``rest`` whether the person rests after it, ``stance`` in words, ``feet`` the outlines of the
+    planted soles (P, 2) m.
     """
-    said = dance_instructions(dance)
+    said, pauses = dance_instructions(dance), rests(dance)
     holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
     moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
     out = []
@@ -181,11 +188,20 @@ def _cues(dance: Dance) -> list[dict[str, Any]]:
                 "hold_s": held,
                 "end_s": holds[p].end if p in holds else held,
                 "calls": list(said[p]),
+                "after_skips": [list(skipping(dance, p, p - n)) for n in range(2, 5) if _same_feet(dance, p, p - n)],
+                "can_half": _same_feet(dance, p, p - 1),
+                "rest": pauses[p],
                 "stance": stance_words(stance),
                 "feet": [_outline(stance, side) for side in stance.planted],
             }
         )
     return out
+
+
+def _same_feet(dance: Dance, p: int, before: int) -> bool:
+    """Return whether the feet stay where they are from posture ``before`` to posture ``p``."""
+    feet = {(s.planted, s.over, s.ankle.tobytes()) for s in dance.stances[max(before, 0) : p + 1]}
+    return before >= 0 and len(feet) == 1
 
 
 def _outline(stance: Stance, side: int) -> Array:
@@ -218,7 +234,7 @@ def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bo
         raise BiodanceError(f"{' '.join(unsafe)} Or give --despite: then there is a page, which says this on top.")
     scene, carried = scene_of(dance), bundle()
     scene["follow"] = follow_scene(dance) if carried else None
-    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe)
+    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe, dance.care)
     write_files(path.parent, {path.name: page})
     return scene["follow"] is not None
 
@@ -233,20 +249,26 @@ def bundle() -> dict[str, str] | None:
 
 
 def feedback_page(
-    name: str, scene: dict[str, Any], carried: dict[str, str] | None, unsafe: tuple[str, ...] = ()
+    name: str,
+    scene: dict[str, Any],
+    carried: dict[str, str] | None,
+    unsafe: tuple[str, ...] = (),
+    care: tuple[str, ...] = (),
 ) -> str:
-    """Return the page of a dance as HTML text: what it shows (`scene_of`), what follows the person, or None, and in
-    what it is not safe.
+    """Return the page of a dance as HTML text: what it shows (`scene_of`), what follows the person, or None, in what
+    it is not safe, and what is to be taken care of.
     """
     from markupsafe import Markup
 
     return render(
         "feedback.html.j2",
         name=spaced(name),
+        care=care,
         unsafe=unsafe,
         version=__version__,
         style=Markup(template_text("feedback.css")),
         program=Markup(template_text("feedback.js")),
+        visit=Markup(template_text("visit.js")),
         three=Markup(three_js()),
         scene=Markup(script_json(scene)),
         bundle={key: Markup(value) for key, value in carried.items()} if carried else None,

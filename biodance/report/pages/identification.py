@@ -41,6 +41,8 @@ from biodance.report.tables.identification import (
     SUSPECT_ROW,
     TORQUE_ROW,
     VALIDATION_ROW,
+    VISIT_ROW,
+    log_in_words,
     segments_document,
     torques_document,
 )
@@ -248,5 +250,6 @@ def identification_section(found: SessionIdentification) -> str:
         certain=sure,
         total=len(found.changes),
         performance=found.performance,
+        logs=[log_in_words(VISIT_ROW.row(log)) for log in found.performance.logs] if found.performance else (),
         danced=Markup(excitation_figure(found.performance)) if found.performance else "",
     )

@@ -4,10 +4,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from biodance.dance.expectation import Expectation
 from biodance.diagnosis.diagnosis import Estimate
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
+from biodance.display import spaced
 from biodance.identification.identification import Identification
+from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.report.tables.schema import Row, Schema
 
@@ -156,9 +159,35 @@ _FORESIGHT = Schema(
 )
 
 
-def foresight_document(found: Foresight, *, seated: bool = False, plates: str = "") -> Row:
+FIRST = 5
+"""Changes that are told first."""
+_LEARNED = 0.9
+"""Times the table's standard deviation of a mass: less is left of what a dance teaches."""
+
+
+def seen_causes(found: Row) -> list[tuple[str, str]]:
+    """Return effect and target of the causes that a movement will see at their typical size, of its document."""
+    rows = (row for row in found["limits"] if row["limit"] is not None and row["limit"] <= row["typical"])
+    return [(row["effect"], row["target"]) for row in rows]
+
+
+def _learned(known: Expectation | None) -> str:
+    """Return in a sentence which masses a dance teaches, with their expected 95 % half-widths, kg."""
+    if known is None:
+        return ""
+    rows = [
+        f"{spaced(name)} ± {SIGMAS * after:.2g} kg ({SIGMAS * before:.2g})"
+        for name, before, after in zip(known.segments, known.mass[0], known.mass[-1], strict=True)
+        if after < _LEARNED * before
+    ]
+    return f"Masses that it teaches (by the table alone): {', '.join(rows)}." if rows else "It teaches no mass."
+
+
+def foresight_document(
+    found: Foresight, *, seated: bool = False, plates: str = "", known: Expectation | None = None
+) -> Row:
     """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two
     causes it sees; ``care`` what must not be asked of whoever dances ``seated``; ``plates`` a sentence on how much
-    plate the dance needs.
+    plate the dance needs; ``learned`` one on the masses that become ``known``.
     """
-    return _FORESIGHT.row(found) | {"care": _SEATED if seated else "", "plates": plates}
+    return _FORESIGHT.row(found) | {"care": _SEATED if seated else "", "plates": plates, "learned": _learned(known)}

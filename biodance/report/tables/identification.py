@@ -144,15 +144,43 @@ def _torque(bands: TorqueBands, joint: int) -> Row:
     return dict(zip(TORQUE_ROW.places, values, strict=True))
 
 
+VISIT_ROW = Schema(
+    "file camera same",
+    {
+        "begun": lambda log: log.begun.isoformat(),
+        "postures": Schema("number times held_s skipped easier told_percent reached_deg"),
+        "danced": lambda log: sum(one.times > 0 for one in log.postures),
+        "skipped": lambda log: log.numbers("skipped"),
+        "easier": lambda log: log.numbers("easier"),
+        "repeated": lambda log: log.numbers("repeated"),
+    },
+)
+"""One log of a visit; ``same`` False: of another dance than was named."""
+
+
+def log_in_words(row: Row) -> str:
+    """Return a log (`VISIT_ROW`) in a sentence: what was danced, left out, made easier or repeated."""
+    if not row["same"]:
+        return f"{row['file']} is the log of another dance; give the one that was shown."
+    parts = [f"{row['danced']} of {len(row['postures'])} postures danced"]
+    parts += [
+        f"{what} {', '.join(str(number) for number in row[what])}"
+        for what in ("skipped", "easier", "repeated")
+        if row[what]
+    ]
+    return f"{row['file']}: {'; '.join(parts)}."
+
+
 _PERFORMANCE = Schema(
     "dance seconds repeat",
     {
         "excitation": Schema("segment planned reached"),
         "repetitions": Schema("transition start_s=start end_s=end gain most"),
+        "logs": VISIT_ROW,
     },
 )
 """How well a dance was danced: share of the table's variance removed, planned and reached; ``repeat`` the transitions
-to dance once more, by number (n leads from cue n to the next).
+to dance once more, by number (n leads from cue n to the next); ``logs`` what the page that led noted.
 """
 DIFFERENCE_ROW = Schema(
     "segment quantity unit later_minus_earlier=value sd ci95=interval p known",

@@ -35,7 +35,7 @@ function figure(opacity) {
 }
 
 const A = new THREE.Quaternion(), B = new THREE.Quaternion();
-function place(group, second) {
+function place(group, second) { // as planned at that second
   const at = Math.min(Math.max(second, 0) * data.rate_hz, data.frames - 1);
   const k = Math.min(Math.floor(at), data.frames - 2), part = at - k;
   group.children.forEach((mesh, i) => {
@@ -44,6 +44,19 @@ function place(group, second) {
     A.set(POSES[a + 3], POSES[a + 4], POSES[a + 5], POSES[a + 6]).normalize();
     B.set(POSES[b + 3], POSES[b + 4], POSES[b + 5], POSES[b + 6]).normalize();
     mesh.quaternion.copy(A.slerp(B, part));
+  });
+}
+function between(group, from, to, share) { // turns between two planned postures; limbs stay joined
+  place(group, from);
+  const before = group.children.map((mesh) => [mesh.position.clone(), mesh.quaternion.clone()]);
+  place(group, to);
+  const after = group.children.map((mesh) => [mesh.position.clone(), mesh.quaternion.clone()]);
+  group.children.forEach((mesh, i) => {
+    const parent = data.segments[i].parent;
+    mesh.quaternion.copy(before[i][1]).slerp(after[i][1], share);
+    if (parent < 0) return void mesh.position.lerpVectors(before[i][0], after[i][0], share);
+    const joint = after[i][0].clone().sub(after[parent][0]).applyQuaternion(after[parent][1].clone().invert());
+    mesh.position.copy(joint.applyQuaternion(group.children[parent].quaternion).add(group.children[parent].position));
   });
 }
 
@@ -120,6 +133,39 @@ function draw() {
   }
 }
 
+// ---- the person's own way: postures that are left out, or half as far, and where the figure is then ----
+const left_out = new Set(), half = new Set(); // of cues
+const smooth = (u) => u * u * u * (10 - 15 * u + 6 * u * u);
+function reached(k) { // planned second of the posture in which a cue ends
+  if (k < 0) return 0;
+  const { move_s, hold_s } = cues[k];
+  return left_out.has(k) ? reached(k - 1) : half.has(k) ? (move_s + hold_s) / 2 : hold_s;
+}
+function stand_in(now, at) { // planned seconds between which the figure is, and how near it is to the second one
+  const { move_s, hold_s } = cues[now.cue], goal = reached(now.cue), from = reached(now.cue - 1);
+  if (now.phase === "ready" || (now.phase === "end" && goal === hold_s)) return [at, at, 1];
+  if (now.phase !== "move") return [goal, goal, 1];
+  const part = smooth((at - move_s) / (hold_s - move_s));
+  const way = goal === hold_s ? at : move_s + part * (goal - move_s);
+  return !now.cue || from === cues[now.cue - 1].hold_s ? [way, way, 1] : [from, way, part];
+}
+function coming(now) { // the cue that is asked next, or now
+  return now.phase === "hold" ? Math.min(now.cue + 1, cues.length - 1) : now.cue;
+}
+function calls_of(k) { // what is called when some before it were left out; null where the feet change meanwhile
+  let skipped = 0;
+  while (skipped < k && left_out.has(k - 1 - skipped)) skipped++;
+  return skipped ? cues[k].after_skips[skipped - 1] ?? null : cues[k].calls;
+}
+function may_skip(k) {
+  if (k + 1 >= cues.length) return false;
+  const was = left_out.has(k);
+  left_out.add(k);
+  const can = calls_of(k + 1) !== null;
+  if (!was) left_out.delete(k);
+  return can;
+}
+
 // ---- what is told -------------------------------------------------------------------------------------------------
 const cues = data.cues;
 function moment(second) {
@@ -145,29 +191,53 @@ function words(text) {
 
 let told = "";
 function tell(now) {
-  const coming = now.phase === "hold" ? Math.min(now.cue + 1, cues.length - 1) : now.cue;
-  const last = now.phase === "hold" && now.cue === cues.length - 1;
-  by("count").textContent = now.phase === "end" ? "" : Math.max(1, Math.ceil(now.left - 1e-6));
-  const key = now.phase + now.cue;
+  const next = coming(now), last = now.phase === "hold" && now.cue === cues.length - 1;
+  by("count").textContent = now.phase === "end" ? "" : Math.max(1, Math.ceil(now.left + wait - 1e-6));
+  const key = [now.phase, now.cue, pausing, half.has(next), ...left_out].join(" ");
   if (key === told) return;
   told = key;
-  const shown = cues[now.phase === "move" ? now.cue : coming];
+  const shown = cues[next], called = calls_of(next) ?? shown.calls;
+  const asked = now.phase === "end" || last ? [] : half.has(next) ? ["only half of the way:", ...called] : called;
   by("number").textContent = now.phase === "end" ? "The end" : `${cues[now.cue].number} of ${cues.length}`;
   by("stance").textContent = (now.phase === "hold" && !last ? "next: " : "") + shown.stance;
   by("told").className = now.phase;
-  by("now").textContent = { ready: "Get ready", move: "Move now", end: "Thank you", hold: last ? "Stand still" :
-    "Stand still. Next:" }[now.phase];
-  by("calls").replaceChildren(...(now.phase === "end" || last ? [] : shown.calls.map(words)));
+  let held_in = now.cue;
+  while (held_in && left_out.has(held_in)) held_in--;
+  const back = `Take up posture ${cues[held_in].number} again. Next:`, hold = `${data.still}${last ? "" : ". Next:"}`;
+  by("now").textContent = pausing === "rest" ? "Rest. Let the arms down" : pausing === "back" ? back :
+    { ready: "Get ready", move: "Move now", end: "Thank you", hold }[now.phase];
+  by("calls").replaceChildren(...asked.map(words));
+  by("care").hidden = now.phase !== "ready" && pausing !== "rest";
+  by("easier").disabled = !shown.can_half || last || now.phase === "end";
+  by("easier").setAttribute("aria-pressed", String(half.has(next)));
+  by("skip").disabled = last || now.phase === "end" || !may_skip(next);
+  speak(now.phase === "move" ? "Now." : [by("now").textContent, ...asked].join(" "));
   lines.clear();
   lines.add(outline(PLATE, 0xb0b6bb), ...shown.feet.map((points) => outline(points, 0x222222)));
 }
 
-function preview(second, now) {
+const slow = (cue) => (cue.hold_s - cue.move_s) / SHARE; // s of its move in slow motion
+function preview(second, now) { // what comes, in slow motion while the person holds still
   ghost.visible = now.phase === "hold" ? now.cue + 1 < cues.length : now.phase !== "end";
-  const cue = cues[now.phase === "hold" ? Math.min(now.cue + 1, cues.length - 1) : now.cue];
-  if (now.phase !== "hold" || still) return place(ghost, cue.hold_s);
-  const loop = (cue.hold_s - cue.move_s) / SHARE + 1, since = (second - cues[now.cue].hold_s) % loop;
-  place(ghost, Math.min(cue.move_s + SHARE * since, cue.hold_s));
+  const k = coming(now), { move_s, hold_s } = cues[k];
+  if (now.phase !== "hold" || still) return place(ghost, reached(k));
+  const since = (second - cues[now.cue].hold_s + waited) % (slow(cues[k]) + 1);
+  const at = Math.min(move_s + SHARE * since, hold_s);
+  between(ghost, ...stand_in({ phase: at < hold_s ? "move" : "hold", cue: k }, at));
+}
+
+// ---- the voice: one of this computer, if asked for ----
+const voices = window.speechSynthesis;
+by("speak").closest("label").hidden = !voices;
+voices?.getVoices(); // asked early: a browser fills its list later
+function speak(text) {
+  if (!voices || !by("speak").checked || !playing) return;
+  const voice = voices.getVoices().find((one) => one.localService && one.lang.startsWith("en"));
+  if (!voice) return void (by("said").textContent = "This browser has no English voice of its own: nothing is spoken.");
+  const said = new SpeechSynthesisUtterance(text.replaceAll("°", " degrees"));
+  said.voice = voice;
+  voices.cancel();
+  voices.speak(said);
 }
 
 // ---- sound --------------------------------------------------------------------------------------------------------
@@ -191,9 +261,11 @@ function sound(before, now) {
 // ---- time ---------------------------------------------------------------------------------------------------------
 const asked = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN);
 let second = Number.isFinite(asked) ? asked : -LEAD, playing = false, stamp = 0, frames = 0;
+let wait = 0, waited = 0, pausing = ""; // s that the dance stands still, and has in this hold; "rest", "back" or ""
+const rested = new Set(); // cues
 function show() {
   const now = moment(second);
-  place(body, second);
+  between(body, ...stand_in(now, second));
   preview(second, now);
   tell(now);
   draw();
@@ -204,31 +276,70 @@ function show() {
 }
 function tick(time) {
   if (!playing) return;
-  const before = moment(second);
-  second += (Math.min(Math.max(time - stamp, 0), 1000) / 1000) * Number(by("speed").value);
+  const before = moment(second), spent = Math.min(Math.max(time - stamp, 0), 1000) / 1000;
   stamp = time;
-  sound(before, moment(second));
+  dispatchEvent(new CustomEvent("danced", { detail: { ...before, spent } }));
+  const waits = Math.min(wait, spent), end = waits < wait ? second : second + (spent - waits) *
+    Number(by("speed").value);
+  [wait, waited] = [wait - waits, waited + waits];
+  const now = moment(end);
+  if (end > second) pausing = "";
+  if (before.phase === "hold" && now.phase === "move" && cues[before.cue].rest && !rested.has(before.cue)) {
+    rested.add(before.cue);
+    pausing = "rest";
+    return run(false);
+  }
+  second = end;
+  sound(before, now);
+  if (now.phase !== before.phase || now.cue !== before.cue) arrive(now);
   show();
   if (second >= data.duration_s) run(false);
   else requestAnimationFrame(tick);
+}
+function arrive(now) { // in another part of the dance: look first at what comes, if asked for
+  waited = 0;
+  if (now.phase !== "hold" || now.cue + 1 >= cues.length || !by("first").checked) return;
+  wait = Math.max(wait, slow(cues[now.cue + 1]) + 0.5 - now.left);
 }
 function run(on) {
   playing = on;
   by("play").textContent = on ? "Pause" : second > -LEAD && second < data.duration_s ? "Go on" : "Start";
   if (!on) return show();
   if (second >= data.duration_s) restart();
+  if (pausing === "rest") [pausing, wait] = ["back", LEAD];
+  told = ""; // said once more, aloud if asked for
   audio = audio || new AudioContext();
   stamp = performance.now();
   requestAnimationFrame(tick);
 }
-function leap(step) {
-  const at = moment(second).cue + step;
-  second = at < 0 ? -LEAD : cues[Math.min(at, cues.length - 1)].move_s;
-  dispatchEvent(new Event("leapt"));
+function repeat() { // the posture of the moment: back to the one before it, and once more
+  const k = moment(second).cue;
+  dispatchEvent(new CustomEvent("leapt", { detail: k }));
+  left_out.delete(k);
+  rested.delete(k);
+  [second, waited, wait] = k ? [cues[k - 1].hold_s, 0, cues[k].hold_s - cues[k].move_s] : [-LEAD, 0, 0];
+  pausing = k ? "back" : "";
+  show();
+}
+function skip() { // what comes: the person stays in the posture before it
+  const k = coming(moment(second));
+  if (!may_skip(k) || second >= data.duration_s) return;
+  left_out.add(k);
+  half.delete(k);
+  [second, waited, wait, pausing] = [cues[k].hold_s, 0, 0, ""];
+  dispatchEvent(new CustomEvent("skipped", { detail: k }));
+  arrive(moment(second));
+  show();
+}
+function easier() { // what comes: half of the way, which is a part of the planned one
+  const k = coming(moment(second));
+  if (by("easier").disabled) return;
+  half.has(k) ? half.delete(k) : half.add(k);
   show();
 }
 function restart() {
-  second = -LEAD;
+  [second, wait, waited, pausing] = [-LEAD, 0, 0, ""];
+  for (const some of [left_out, half, rested]) some.clear();
   dispatchEvent(new Event("restarted"));
 }
 function stop() {
@@ -237,13 +348,14 @@ function stop() {
 }
 by("play").onclick = () => run(!playing);
 by("stop").onclick = stop;
-by("back").onclick = () => leap(-1);
-by("next").onclick = () => leap(1);
+by("repeat").onclick = repeat;
+by("easier").onclick = easier;
+by("skip").onclick = skip;
 by("view").onchange = show;
 addEventListener("resize", show);
 addEventListener("keydown", (event) => {
   if (event.target.matches("select, input, button") && event.key === " ") return;
-  const does = { " ": () => run(!playing), Escape: stop, ArrowLeft: () => leap(-1), ArrowRight: () => leap(1),
+  const does = { " ": () => run(!playing), Escape: stop, ArrowLeft: repeat, ArrowRight: skip, e: easier,
     v: () => { by("view").selectedIndex = (by("view").selectedIndex + 1) % 3; show(); } }[event.key];
   if (!does || (event.target.matches("select") && event.key.startsWith("Arrow"))) return;
   event.preventDefault();
@@ -352,4 +464,3 @@ function align() { // the camera whose picture has the plate's corners where the
   aligned = { place: view.invert(), projection: new THREE.Matrix4().set(f * by2, 0, 0, 0, 0, f, 0, 0, 0, 0,
     (far + near) / (near - far), (2 * far * near) / (near - far), 0, 0, -1, 0) };
 }
-show();

@@ -93,7 +93,8 @@ function take(told) {
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
   if (why || when < 0 || !playing) return;
-  const plan = planned(when), spots = (order) => follow.points.map(({ number }) => {
+  const now = moment(when), plan = planned(now.phase === "hold" ? reached(now.cue) : when);
+  const spots = (order) => follow.points.map(({ number }) => {
     const { x, y, sure: s } = points[order(number)];
     return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
   });
@@ -103,7 +104,8 @@ function take(told) {
   last.p = best.p;
   const share = 1 / Math.min(++camera.count, 50);
   camera.at = camera.at.map((value, k) => value + share * (best.p[k] - value));
-  keep(when, best);
+  const own = planned(when); // what is kept is off the plan, also of who goes half of the way
+  keep(when, { p: best.p.map((value, i) => (i < 7 ? value : value + plan.angles[i - 7] - own.angles[i - 7])) });
   correct(when, plan, best);
 }
 // of some descents: from the last look; else with sides confused, arms hanging
@@ -124,7 +126,6 @@ function report(text) {
 }
 
 // ---- what is told by what was danced: the plan, moved by what the camera saw at knots of time ----
-const smooth = (u) => u * u * u * (10 - 15 * u + 6 * u * u);
 const knot = (phase, when) => { // the end of a hold, the middle of a move
   const part = (when - phase.start) / (phase.end - phase.start);
   if (phase.kind === "hold") return part > 0.3 ? "hold" + phase.posture : null;
@@ -171,10 +172,17 @@ function grade(phase) { // after a hold: what the move that led to it and the po
   const got = mean(known) - mean(before), could = mean(whole) - mean(before);
   grades[phase.posture] = Math.round(100 * Math.min(1, Math.max(0, got / Math.max(could, 1e-6))));
   const number = cues[phase.posture].number;
-  by("grade").textContent = parts.some(Boolean) ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.`
+  const short = shortest(phase.posture);
+  by("grade").textContent = parts.some(Boolean)
+    ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.${short}`
     : `Posture ${number}: I did not see it.`;
   draw_known();
   if (!paused && known.every((value, s) => value >= ENOUGH * goal[s])) finish();
+}
+function shortest(k) { // what stayed farthest behind, by more than the camera errs
+  const is = reach(k), want = asked_bends[k];
+  const [name] = is ? Object.keys(is).sort((a, b) => want[b] - is[b] - want[a] + is[a]) : [];
+  return name && want[name] - is[name] > 15 ? ` Seen: ${name} ${is[name]}° of ${Math.round(want[name])}°.` : "";
 }
 function draw_known() {
   goal ??= shares(follow.phases.map(intended).reduce(sum));
@@ -203,6 +211,30 @@ function missing() { // at the end: the posture that adds most to what was dance
   return `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.`;
 }
 
+// ---- how far the joints go, in degrees, by the points of the body ----
+let bends = {}, asked_bends = {}; // of a posture: the angles of every look; those that are planned
+const BENDS = { "arm lifted": ["shoulder", "elbow", "hip"], "elbow bent": ["elbow", "shoulder", "wrist"],
+  "hip bent": ["hip", "shoulder", "knee"], "knee bent": ["knee", "hip", "ankle"] };
+function angles_of(points) {
+  const where = (name) => points[follow.points.findIndex((one) => one.name === name)], out = {};
+  for (const side of ["left", "right"]) for (const [name, [at, one, other]] of Object.entries(BENDS)) {
+    const [a, b] = [one, other].map((end) => minus(where(`${side} ${end}`), where(`${side} ${at}`)));
+    const dot = a.reduce((sum, value, i) => sum + value * b[i], 0) / (Math.hypot(...a) * Math.hypot(...b));
+    const angle = (180 / Math.PI) * Math.acos(Math.max(-1, Math.min(1, dot)));
+    out[`${side} ${name}`] = name === "arm lifted" ? angle : 180 - angle;
+  }
+  return out;
+}
+const median = (list) => [...list].sort((a, b) => a - b)[list.length >> 1];
+function reach(k) { // degrees of a posture as held; null when it was not seen
+  const looks = bends[k];
+  return looks ? Object.fromEntries(Object.keys(looks[0]).map((name) => [name, Math.round(median(looks.map((one) =>
+    one[name])))])) : null;
+}
+window.followed = { reach, angles: (when) => angles_of(joints(pose(planned(when)))), told: (k) => grades[k] ?? null,
+  known: () => goal && Object.fromEntries(known.map((value, s) => [follow.segments[s],
+    Math.min(100, Math.round((100 * value) / goal[s]))])) };
+
 // ---- what to correct now, in a posture that is held ----
 const WAYS = [[2, "higher", "lower"], [1, "further to your left", "further to your right"]];
 let asked_for = "", asked_times = 0;
@@ -212,6 +244,8 @@ function correct(when, plan, one) {
   const phase = follow.phases.find(({ kind, start, end }) => kind === "hold" && when >= start && when < end);
   if (!phase) return;
   const is = joints(pose(stand(moved(plan, one.p), plan, phase.planted))), want = joints(pose(plan));
+  (bends[phase.posture] ??= []).push(angles_of(is));
+  asked_bends[phase.posture] ??= angles_of(want);
   let worst = 0.1, said = ""; // m
   want.forEach((x, k) => WAYS.forEach(([axis, more, less]) => {
     const off = x[axis] - is[k][axis], weight = follow.points[k].asks;
@@ -239,19 +273,19 @@ setInterval(look, 40);
 addEventListener("shown", () => {
   if (!stream || !playing && second < data.duration_s) return;
   const over = follow.phases.find((one) => one.kind === "hold" && !graded.has(one.posture) && second >= one.end - 0.05
-    && second < one.end + 3);
+    && second < one.end + 3 && !left_out.has(one.posture));
   if (over) grade(over);
   if (second >= data.duration_s) by("ask").textContent = missing();
 });
-addEventListener("leapt", () => { // what is danced once more tells once more
-  const from = moment(second).cue;
+addEventListener("leapt", ({ detail: from }) => { // what is danced once more tells once more
   graded = new Set([...graded].filter((posture) => posture < from));
   for (const key of Object.keys(knots)) if (Number(key.slice(4)) >= from) delete knots[key];
+  for (const key of Object.keys(bends)) if (Number(key) >= from) delete bends[key];
   paused = false;
 });
 addEventListener("restarted", () => {
   [H, known] = [new Float64Array(P * P), new Array(PARTS).fill(0)];
-  [graded, grades, knots, paused] = [new Set(), {}, {}, false];
+  [graded, grades, knots, bends, paused] = [new Set(), {}, {}, {}, false];
   for (const id of ["ask", "grade"]) by(id).textContent = "";
   if (stream) draw_known();
 });
