@@ -85,8 +85,8 @@ def clipped(trial: Trial) -> list[tuple[str, float]]:
 
 
 def flat_level(values: Array, rate: float) -> float | None:
-    """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not. What is flat from the
-    first sample or to the last one was not reached and left: there a file was filled up.
+    """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not. What is flat from
+    the first sample or to the last one was not reached and left: there a file was filled up.
     """
     values = values[np.isfinite(values)]
     span = float(np.ptp(values)) if values.size > 2 else 0.0

@@ -28,12 +28,8 @@ from biodance.records import Array
 
 TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
-LOUD, QUIET = 0.5, -1.0
-"""Standard deviation of the logarithm of the noise, between laboratories and persons, and the least that is believed:
-ten real sessions of six laboratories, each band and channel with its own noise, have -0.1 to -2.6 of what their
-movement and their markers let expect. At less than a third of it the sizes of what is no fault are too small: a child's
-foot had a load, a plate a drift.
-"""
+LOUD = 0.5
+"""Standard deviation of the logarithm of the noise, between laboratories and persons."""
 SPREAD, FLESH, TOLERANCE = 0.25, 0.6, 0.35
 """Standard deviation of the logarithm of the size of a group of what is no fault, between persons and laboratories: of
 the body, of soft tissue, and of tolerances.
@@ -172,7 +168,7 @@ def prior_sd(rows: Rows) -> Array:
     return np.array([known.get(name, TOLERANCE) for name in rows.groups])
 
 
-def fit(found: Products, sd: Array, start: Scales, *, least: float = QUIET) -> ScaledFit:
+def fit(found: Products, sd: Array, start: Scales, *, least: float = 0.0) -> ScaledFit:
     """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
     searched for from ``start``; the noise is at least ``least``.
     """
@@ -205,7 +201,7 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     return ScaledFit(lower, u, size, at, float(value), square, found)
 
 
-def nearer(one: ScaledFit, sd: Array, least: float = QUIET) -> Scales:
+def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
     """Return the scales after one step of Fisher scoring; no group is believed to be smaller than `FLOOR`, and no noise
     than ``least``.
     """

@@ -20,6 +20,7 @@ from biodance.inference.contact import with_contacts
 from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
+from biodance.inference.own_noise import own_noise
 from biodance.inference.rows import Rows, rows_of, with_observed
 from biodance.inference.scales import fit, nominal, prior_sd, products
 from biodance.inference.sets import Search, hypothesis, infer
@@ -84,6 +85,7 @@ def judge(
         bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     if seen is not None and simulate and not seen.standing:
         every = with_observed(seen.causes, evidence, asked, seen.problem)
+        known = own_noise(rows_of(seen.problem, every, known, evidence))
         rows = rows_of(seen.problem, every, known, evidence)
     else:
         every = with_observed((), evidence, asked)

@@ -23,7 +23,6 @@ from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
 from biodance.inference.scales import (
     CONVERGED,
-    QUIET,
     TAIL,
     ScaledFit,
     Scales,
@@ -60,7 +59,7 @@ class Search:
     columns: VisibleColumns
     Z: Array
     cuts: tuple[slice, ...]
-    least: float = QUIET
+    least: float = 0.0
 
     @classmethod
     def of(cls, rows: Rows, causes: Sequence[Candidate]) -> "Search":
