@@ -1,9 +1,9 @@
 """The noise of a session as it shows it: restricted maximum likelihood by band and channel, never louder than expected.
 
 Tolerances say how loud a session of its movement and its markers may be. Most real ones are quieter, each in its own
-bands: beside everything that is no fault, s_q^2 = |e_q|^2 / (n_q - t_q), e what the posterior mean leaves of the rows of
-a band and channel, t the degrees of freedom that the columns take of them. A fault in these rows counts as their noise
-here, so that they are as loud as it is, or as expected.
+bands: beside everything that is no fault, s_q^2 = |e_q|^2 / (n_q - t_q), e what the posterior mean leaves of the rows
+of a band and channel, t the degrees of freedom that the columns take of them. A fault in these rows counts as their
+noise here, so that they are as loud as it is, or as expected.
 """
 
 from dataclasses import replace

@@ -80,9 +80,6 @@ def judge(
     """Return the diagnosis of a session from everything it shows; from observations alone where nothing was ``seen``,
     it only stands, or the simulation cannot be believed (``simulate`` False).
     """
-    if seen is not None:
-        bare = _with_limits(bare, seen, known, asked)
-        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     if seen is not None and simulate and not seen.standing:
         every = with_observed(seen.causes, evidence, asked, seen.problem)
         known = own_noise(rows_of(seen.problem, every, known, evidence))
@@ -90,6 +87,9 @@ def judge(
     else:
         every = with_observed((), evidence, asked)
         rows = rows_of(None, every, known, evidence)
+    if seen is not None:
+        bare = _with_limits(bare, seen, known, asked)
+        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     search, posterior = _inferred(rows, every, asked, evidence)
     causes = search.causes
     found = decide(search, posterior, bare)
