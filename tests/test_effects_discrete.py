@@ -157,11 +157,14 @@ def test_a_flat_top_is_named_with_its_level(channel: int, target: str, limit: fl
     assert (found[0].quantity, found[0].unit) == ("limit", "N" if channel < 3 else "N·m")
 
 
-def test_coarse_converters_and_empty_plates_do_not_clip() -> None:
+def test_coarse_converters_empty_plates_and_filled_ends_do_not_clip() -> None:
+    """A file that was shifted in time repeats its first values, which may be the largest of a hardly used plate."""
     value = standing(np.random.default_rng(5))
     coarse = np.round(value / 4) * 4
     stepped_off = np.where((np.arange(len(value)) > 6000)[:, None], 0.0, value)
-    for fine in (coarse, stepped_off):
+    falling = value * np.linspace(2.0, 1.0, len(value))[:, None]
+    filled = np.concatenate([np.tile(falling[:1] * 1.1, (30, 1)), falling[:-30]])
+    for fine in (coarse, stepped_off, filled, filled[::-1]):
         assert failed(discrete_effects()["clipping"].check(recorded(fine))) == []
 
 

@@ -63,6 +63,15 @@ def test_added_is_what_transform_adds(name: str) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("carried", "sloshing", "possible"), [(6.0, 4.5, True), (2.0, 2.0, True), (0.1, 4.3, False), (4.0, -1.0, False)]
+)
+def test_no_more_sloshes_than_is_carried(carried: float, sloshing: float, possible: bool) -> None:
+    """What swings with a walker without weighing anything is the walker's own flesh."""
+    theta = np.array([carried, sloshing, 0.0, 0.0])
+    assert replace(effect("sloshing_load"), target="trunk_head").possible_in(human_case(120), theta) is possible
+
+
 def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
     found = replace(effect("sloshing_load"), target="trunk_head")
     case = human_case(300)

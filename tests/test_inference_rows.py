@@ -100,6 +100,17 @@ def test_columns_of_one_kind_are_one_group_and_share_a_scale() -> None:
     assert (found.block[found.simulated :] == -1).all()
 
 
+def test_a_spread_between_laboratories_has_no_scale() -> None:
+    """It holds in a careless laboratory, too: only what was learned in one laboratory grows with its carelessness."""
+    put = problem(body(), short(nothing), chosen=("plate_offset",))
+    causes = causes_of(put, known(), ("plate_offset",))
+    between = replace(known(), between=frozenset({"plate_offset Fx"}))
+    for found in (rows_of(put, causes, between, SILENT), rows_of(None, causes, between, told(1.0, 2.0, sd=1.0))):
+        groups = {name: found.group[where.start] for name, (where, _) in found.tolerated.items()}
+        assert groups.pop(OFFSET) == -1
+        assert set(groups.values()) <= {found.groups.index(TOLERATED)}
+
+
 def test_a_tolerance_is_the_same_in_plates_and_observations() -> None:
     """Its column is what one standard deviation of it adds to either."""
     found, _ = rows(told(1.0, 2.0, sd=0.5))

@@ -85,7 +85,9 @@ def clipped(trial: Trial) -> list[tuple[str, float]]:
 
 
 def flat_level(values: Array, rate: float) -> float | None:
-    """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not."""
+    """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not. What is flat from
+    the first sample or to the last one was not reached and left: there a file was filled up.
+    """
     values = values[np.isfinite(values)]
     span = float(np.ptp(values)) if values.size > 2 else 0.0
     if not span > 0 or np.unique(np.round(values / (_SAME * span))).size < _LEVELS:
@@ -94,12 +96,12 @@ def flat_level(values: Array, rate: float) -> float | None:
     starts = np.flatnonzero(same & ~np.append(False, same[:-1]))
     stops = np.flatnonzero(same & ~np.append(same[1:], False)) + 1
     lengths, levels = stops - starts, values[starts]
-    highest, lowest = values.max(), values.min()
+    highest, lowest, inside = values.max(), values.min(), (starts > 0) & (stops < values.size - 1)
     between = (levels < highest - 2 * _SAME * span) & (levels > lowest + 2 * _SAME * span)
     between &= np.abs(levels) > AT_ZERO * np.abs(values).max()  # an empty plate that is set to zero is flat, too
     elsewhere = lengths[between].max(initial=1)
     for extreme in (highest, lowest):
-        at = np.abs(levels - extreme) <= 2 * _SAME * span
+        at = inside & (np.abs(levels - extreme) <= 2 * _SAME * span)
         long = lengths[at].max(initial=0)
         if long > _LONGEST * rate and long > _CLEARLY * elsewhere and abs(extreme) > AT_ZERO * np.abs(values).max():
             return float(extreme)

@@ -26,9 +26,10 @@ from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
-BODY, OBSERVED, TOLERATED = "body", "observed", "tolerances"
-"""Groups of columns: the parameters of the body, errors that several observations share, and causes within their
-tolerance: a laboratory is careful in all of them, or in none."""
+BODY, FIXED, TOLERATED = "body", "fixed", "tolerances"
+"""Groups of columns: the parameters of the body; errors that several observations share, and causes whose tolerance is
+their spread between real laboratories (`Tolerances.between`), which have no scale; causes within other tolerances: a
+laboratory is careful in all of them, or in none."""
 SOFT = ("slide", "flesh", "sag", "tilt", FilterMismatch.name)
 """Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
 
@@ -50,7 +51,7 @@ class Rows:
     y : (r,) array
         Whitened target.
     group : (K,) array of int
-        Index in ``groups`` of each column: columns of one group share a scale; -1: errors that observations share.
+        Index in ``groups`` of each column: columns of one group share a scale; -1: of `FIXED` size.
     block : (r,) array of int
         Noise group of each row: band times 6 + channel for the plates, then markers; -1 for observations.
     groups : tuple of str
@@ -185,7 +186,7 @@ def rows_of(
     tolerated = tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
     if problem is None:
         X, y = np.zeros((0, len(tolerated))), np.zeros(0)
-        names = [TOLERATED] * len(tolerated)
+        names = [_group(key_of(*one.names), tolerances) for one in tolerated]
         units: _Units = {
             one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
             for k, one in enumerate(tolerated)
@@ -196,14 +197,14 @@ def rows_of(
     if seen is not None:
         reach = np.ones(len(seen.observations)) if everywhere else seen.in_reach.astype(float)
         X, y, names = _with_observations(X, y, names, units, seen, reach)
-    groups = tuple(name for name in dict.fromkeys(names) if name != OBSERVED)
+    groups = tuple(name for name in dict.fromkeys(names) if name != FIXED)
     return Rows(
         problem,
         tolerances,
         seen,
         X,
         y,
-        np.array([-1 if name == OBSERVED else groups.index(name) for name in names], dtype=int),
+        np.array([-1 if name == FIXED else groups.index(name) for name in names], dtype=int),
         _blocks(problem, len(y)),
         groups,
         units,
@@ -226,7 +227,7 @@ def _simulated(
     units = {
         name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
     }
-    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key) for key in known.keys], units
+    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key, tolerances) for key in known.keys], units
 
 
 def _with_observations(
@@ -244,11 +245,15 @@ def _with_observations(
     top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
     bottom = np.concatenate([below, shared], axis=1) * reach[:, None]
     value = reach * np.array([one.value - one.expected for one in seen.observations]) / own
-    return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[OBSERVED] * shared.shape[1]]
+    return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[FIXED] * shared.shape[1]]
 
 
-def _group(key: str) -> str:
-    """Return the group of a key: what is alike in kind is as large, or as small, together."""
+def _group(key: str, tolerances: Tolerances) -> str:
+    """Return the group of a key: what is alike in kind is as large, or as small, together; what was learned between
+    laboratories holds in this one as it is.
+    """
+    if key in tolerances.between:
+        return FIXED
     kind = key.removeprefix("habit ").split()[0]
     return kind if kind in SOFT else TOLERATED
 

@@ -11,7 +11,7 @@ Observations have Student's errors with four degrees of freedom (about one step 
 are iterated (iteratively reweighted least squares). The log evidence is Laplace's approximation over all coefficients.
 
 One scale holds for the noise of all bands and channels: where one of them is louder than the others, the simulation is
-that far off, and nothing is believed that is smaller.
+that far off everywhere.
 """
 
 from dataclasses import dataclass, replace

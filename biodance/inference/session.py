@@ -20,6 +20,7 @@ from biodance.inference.contact import with_contacts
 from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
+from biodance.inference.own_noise import own_noise
 from biodance.inference.rows import Rows, rows_of, with_observed
 from biodance.inference.scales import fit, nominal, prior_sd, products
 from biodance.inference.sets import Search, hypothesis, infer
@@ -79,15 +80,16 @@ def judge(
     """Return the diagnosis of a session from everything it shows; from observations alone where nothing was ``seen``,
     it only stands, or the simulation cannot be believed (``simulate`` False).
     """
-    if seen is not None:
-        bare = _with_limits(bare, seen, known, asked)
-        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     if seen is not None and simulate and not seen.standing:
         every = with_observed(seen.causes, evidence, asked, seen.problem)
+        known = own_noise(rows_of(seen.problem, every, known, evidence))
         rows = rows_of(seen.problem, every, known, evidence)
     else:
         every = with_observed((), evidence, asked)
         rows = rows_of(None, every, known, evidence)
+    if seen is not None:
+        bare = _with_limits(bare, seen, known, asked)
+        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     search, posterior = _inferred(rows, every, asked, evidence)
     causes = search.causes
     found = decide(search, posterior, bare)

@@ -80,7 +80,8 @@ class Tolerances:
     effect: share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite
     like its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
     beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
-    the plates' zero, an error like the other sizes: it hides causes, and no noise does.
+    the plates' zero, an error like the other sizes: it hides causes, and no noise does; ``between`` the keys of
+    ``sizes`` that are a spread between real laboratories.
     """
 
     sizes: Mapping[str, float]
@@ -93,6 +94,7 @@ class Tolerances:
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
     norms: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     zeros: Array = field(default_factory=lambda: np.zeros(()))
+    between: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
@@ -134,7 +136,8 @@ def shipped() -> Tolerances:
     which).
     """
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
-    return without_habits(replace(rest, sizes=table_sizes()))
+    between = frozenset(_row_key(row) for row in error_rows() if row["learned_on"] == _BETWEEN)
+    return without_habits(replace(rest, sizes=table_sizes(), between=between))
 
 
 _PHYSICS = ("sag ",)
@@ -162,20 +165,24 @@ def without_habits(found: Tolerances) -> Tolerances:
     return replace(found, sizes={**found.sizes, **wider}, means=physics)
 
 
-_LEARNED = ("null_sessions", "family", "real_laboratories")
-"""Where the sizes were learned by which sessions without fault are judged."""
+_BETWEEN = "real_laboratories"
+_LEARNED = ("null_sessions", "family", _BETWEEN)
+"""Where the sizes were learned by which sessions without fault are judged, and of them those that are a spread between
+laboratories."""
 
 
 def table_sizes() -> dict[str, float]:
     """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and
     those of joints before any functional calibration.
     """
-    sizes = {}
-    for row in error_rows():
-        if row["learned_on"] in _LEARNED or row["quantity"] in CALIBRATED:
-            key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
-            sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
-    return sizes
+    used = (row for row in error_rows() if row["learned_on"] in _LEARNED or row["quantity"] in CALIBRATED)
+    return {_row_key(row): float(row["sd"]) for row in used}
+
+
+def _row_key(row: Mapping[str, str]) -> str:
+    """Return the key of a row of the table of sizes."""
+    key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
+    return key + (BEFORE if row["state"] == "before" else "")
 
 
 def read_tolerances(text: str) -> Tolerances:

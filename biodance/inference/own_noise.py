@@ -1,0 +1,56 @@
+"""The noise of a session as it shows it: restricted maximum likelihood by band and channel, never louder than expected.
+
+Tolerances say how loud a session of its movement and its markers may be. Most real ones are quieter, each in its own
+bands: beside everything that is no fault, s_q^2 = |e_q|^2 / (n_q - t_q), e what the posterior mean leaves of the rows
+of a band and channel, t the degrees of freedom that the columns take of them. A fault in these rows counts as their
+noise here, so that they are as loud as it is, or as expected.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from biodance.inference.columns import VisibleColumns
+from biodance.inference.rows import Rows
+from biodance.inference.scales import LOUD, ScaledFit, fit, nominal, prior_sd, products
+from biodance.records import CHANNELS, Array
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import Tolerances
+
+_ROUNDS, _NEAR = 10, 0.03
+_QUIETEST = 0.2
+"""Share of the expected noise below which none is believed: what is no fault is learned no better."""
+
+
+def own_noise(rows: Rows) -> Tolerances:
+    """Return the tolerances of ``rows`` with the noise that the session shows in every band and channel, in the
+    channels in which they are whitened: at most as expected, its logarithm shrunk towards that by its prior
+    ~ N(0, `LOUD`^2).
+    """
+    columns, scales, sd = VisibleColumns.of(rows), nominal(rows), prior_sd(rows)
+    none, quiet = np.empty((len(rows.y), 0)), np.ones(rows.noises + 1)
+    for _ in range(_ROUNDS):
+        found = fit(products(columns, none, rows.y, 1 / quiet), sd, scales)
+        before, scales = quiet, found.scales
+        quiet = _shown(rows, columns, found, before)
+        if np.abs(np.log(quiet / before)).max() < _NEAR:
+            break
+    share = quiet[: len(BANDS) * len(CHANNELS)].reshape(len(BANDS), 1, len(CHANNELS))
+    root = np.linalg.cholesky(rows.tolerances.noise) * share
+    return replace(rows.tolerances, noise=root @ root.swapaxes(1, 2))
+
+
+def _shown(rows: Rows, columns: VisibleColumns, found: ScaledFit, quiet: Array) -> Array:
+    """Return (Q + 1,) the noise of each band and channel over what is expected, from the posterior at ``quiet``."""
+    n = rows.plates
+    X = columns.X[:n] * found.size
+    taken = np.sum(solve_triangular(found.lower, X.T, lower=True, check_finite=False) ** 2, axis=0)
+    left = rows.y[:n] - X @ found.u
+    count, square, took = (np.bincount(rows.block[:n], weight, len(quiet)) for weight in (np.ones(n), left**2, taken))
+    free = count - took / quiet**2
+    there = (count > 0) & (free > 0)
+    size = np.zeros(len(quiet))
+    size[there] = 0.5 * np.log(np.maximum(square[there] / free[there], 1e-12))
+    size *= 2 * free / (2 * free + 1 / LOUD**2)
+    return np.asarray(np.clip(np.exp(size), _QUIETEST, 1.0))

@@ -1,0 +1,73 @@
+"""The noise of a session as it shows it, of rows that were drawn with noise of a known size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inferred_rows import DrawnRows, rows
+
+from biodance.inference.own_noise import own_noise
+from biodance.records import CHANNELS
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import Tolerances
+
+BLOCKS = len(BANDS) * len(CHANNELS)
+EXPECTED = np.array([[4.0, 1.0, 0, 0, 0, 0], [1.0, 9.0, 0, 0, 0, 0], *np.eye(6)[2:]])
+"""N²: what noise of a coefficient is expected in every band, two channels together."""
+
+
+def drawn(size: np.ndarray, *, each: int, seed: int = 3) -> DrawnRows:
+    """Return rows of ``each`` coefficient in every band and channel that are ``size`` (Q,) times as loud as expected,
+    with columns of unit coefficients beside it.
+    """
+    rng = np.random.default_rng(seed)
+    found = rows(rng, plates=each * BLOCKS, blocks=BLOCKS, width=2)
+    n = found.plates
+    y = np.array(found.y)
+    y[:n] = size[found.block[:n]] * rng.normal(size=n)
+    y += found.X @ rng.normal(size=found.X.shape[1])
+    known = Tolerances({}, np.tile(EXPECTED, (len(BANDS), 1, 1)), np.ones((len(BANDS), 6)), 10.0)
+    return replace(found, y=y, tolerances=known)
+
+
+def shown(found: DrawnRows) -> np.ndarray:
+    """Return (Q,) the standard deviation of every whitened row under the session's own noise."""
+    white = np.linalg.inv(np.linalg.cholesky(EXPECTED))
+    own = white @ own_noise(found).noise @ white.T
+    np.testing.assert_allclose(own, own * np.eye(6), atol=1e-12)
+    return np.sqrt(np.einsum("bcc->bc", own)).ravel()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_band_and_channel_is_as_quiet_as_it_shows(seed: int) -> None:
+    size = np.resize([1.0, 0.7, 0.5, 0.35], BLOCKS)
+    np.testing.assert_allclose(shown(drawn(size, each=60, seed=seed)), size, rtol=0.3)
+
+
+def test_none_is_louder_than_expected() -> None:
+    size = np.where(np.arange(BLOCKS) % 2, 3.0, 0.5)
+    found = shown(drawn(size, each=40))
+    np.testing.assert_allclose(found[1::2], 1.0)
+    assert (found[::2] < 0.75).all()
+
+
+def test_few_rows_say_little_and_none_nothing() -> None:
+    """A coefficient or two that happen to be small are no quiet channel."""
+    quiet = np.full(BLOCKS, 0.3)
+    few, many = (np.median(shown(drawn(quiet, each=each))) for each in (2, 40))
+    assert few > 1.3 * many
+    some = drawn(np.full(BLOCKS, 0.5), each=40)
+    gone = np.isin(some.block, [4, 9])
+    kept = replace(some, X=some.X[~gone], y=some.y[~gone], block=some.block[~gone])
+    np.testing.assert_allclose(shown(kept)[[4, 9]], 1.0)
+
+
+def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
+    """Rows that hold a fault stay about as loud as it is; the others become quiet all the same."""
+    found = drawn(np.full(BLOCKS, 0.3), each=40)
+    faulty = found.block == 7
+    y = np.array(found.y)
+    y[faulty] += 0.9 * np.sign(np.arange(faulty.sum()) % 2 - 0.5)
+    own = shown(replace(found, y=y))
+    assert own[7] == pytest.approx(0.95, rel=0.2)
+    assert np.delete(own, 7).max() < 0.5
