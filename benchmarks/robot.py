@@ -13,8 +13,8 @@ damper and the drawing's torque), `ankle=200` the pitch of the ankles gives behi
 N·m in every joint, `friction=0.3` under the feet.
 """
 
+import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -179,4 +179,8 @@ def judge(recording: str, done: str) -> None:
 
 def main() -> None:
     """Record or judge."""
-    {"record": record, "judge": judge}[sys.argv[1]](*sys.argv[2:])
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("what", choices=("record", "judge"))
+    ask.add_argument("words", nargs="+", help="as above")
+    asked = ask.parse_args()
+    {"record": record, "judge": judge}[asked.what](*asked.words)

@@ -141,10 +141,10 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
 
     whole = room.examine_trial
 
-    def stopping(read, body, *, mass):
+    def stopping(read, body, **how):
         if read.trial.name == "unknown_set":
             raise KeyboardInterrupt
-        return whole(read, body, mass=mass)
+        return whole(read, body, **how)
 
     monkeypatch.setattr(room, "examine_trial", stopping)
     assert run(["report", str(session), "--out", str(tmp_path / "out")]) == STOPPED

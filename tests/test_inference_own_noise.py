@@ -11,6 +11,8 @@ from biodance.records import CHANNELS
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
+pytestmark = pytest.mark.usefixtures("as_in_a_stage")
+
 BLOCKS = len(BANDS) * len(CHANNELS)
 EXPECTED = np.array([[4.0, 1.0, 0, 0, 0, 0], [1.0, 9.0, 0, 0, 0, 0], *np.eye(6)[2:]])
 """N²: what noise of a coefficient is expected in every band, two channels together."""
@@ -40,23 +42,23 @@ def shown(found: DrawnRows) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_every_band_and_channel_is_as_quiet_as_it_shows(seed: int) -> None:
-    size = np.resize([1.0, 0.7, 0.5, 0.35], BLOCKS)
-    np.testing.assert_allclose(shown(drawn(size, each=60, seed=seed)), size, rtol=0.3)
+    size = np.resize([1.0, 0.85, 0.7, 0.55], BLOCKS)
+    np.testing.assert_allclose(shown(drawn(size, each=60, seed=seed)), size, rtol=0.25)
 
 
 def test_none_is_louder_than_expected() -> None:
-    size = np.where(np.arange(BLOCKS) % 2, 3.0, 0.5)
+    size = np.where(np.arange(BLOCKS) % 2, 3.0, 0.6)
     found = shown(drawn(size, each=40))
     np.testing.assert_allclose(found[1::2], 1.0)
-    assert (found[::2] < 0.75).all()
+    assert (found[::2] < 0.85).all()
 
 
 def test_few_rows_say_little_and_none_nothing() -> None:
     """A coefficient or two that happen to be small are no quiet channel."""
-    quiet = np.full(BLOCKS, 0.3)
+    quiet = np.full(BLOCKS, 0.55)
     few, many = (np.median(shown(drawn(quiet, each=each))) for each in (2, 40))
-    assert few > 1.3 * many
-    some = drawn(np.full(BLOCKS, 0.5), each=40)
+    assert few > 1.15 * many
+    some = drawn(np.full(BLOCKS, 0.6), each=40)
     gone = np.isin(some.block, [4, 9])
     kept = replace(some, X=some.X[~gone], y=some.y[~gone], block=some.block[~gone])
     np.testing.assert_allclose(shown(kept)[[4, 9]], 1.0)
@@ -70,4 +72,4 @@ def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
     y[faulty] += 0.9 * np.sign(np.arange(faulty.sum()) % 2 - 0.5)
     own = shown(replace(found, y=y))
     assert own[7] == pytest.approx(0.95, rel=0.2)
-    assert np.delete(own, 7).max() < 0.5
+    assert np.delete(own, 7).max() == pytest.approx(0.5)  # none is believed to be quieter

@@ -10,7 +10,7 @@ in ``anthropometry/uncertainty/null_sessions.toml``, or a laboratory's own.
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_rows, error_size
 from biodance.library import locate
-from biodance.records import Array, Index, assign, freeze
+from biodance.records import Array, assign, freeze
 
 REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
@@ -167,8 +167,7 @@ def without_habits(found: Tolerances) -> Tolerances:
 
 _BETWEEN = "real_laboratories"
 _LEARNED = ("null_sessions", "family", _BETWEEN)
-"""Where the sizes were learned by which sessions without fault are judged, and of them those that are a spread between
-laboratories."""
+"""Where the sizes were learned by which sessions without fault are judged; of them the spreads between laboratories."""
 
 
 def table_sizes() -> dict[str, float]:
@@ -273,13 +272,7 @@ def mean_key(name: str, target: str, parameter: str) -> str:
 
 
 _PIECE = 128
-"""Coefficients whitened at once."""
-
-
-def _in_pieces(rows: Index) -> Iterator[Index]:
-    """Yield the indices a few at a time: what is made of them needs little memory."""
-    for start in range(0, rows.size, _PIECE):
-        yield rows[start : start + _PIECE]
+"""Coefficients whitened at once: a few at a time need little memory."""
 
 
 def whitened(
@@ -298,7 +291,8 @@ def whitened(
     out = np.empty(rows.shape, rows.dtype) if out is None else out
     wrench, white = (some[:count].reshape(band.size, 6, math.prod(rows.shape[1:])) for some in (rows, out))
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
-        for some in _in_pieces(np.flatnonzero(band == b)):
+        here = np.flatnonzero(band == b)
+        for some in (here[start : start + _PIECE] for start in range(0, here.size, _PIECE)):
             white[some] = matrix @ wrench[some]
     known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
     sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
