@@ -4,7 +4,7 @@ would keep; one thread of linear algebra; the folder with real recordings.
 
 import os
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -13,13 +13,13 @@ import biodance.pipeline.front  # noqa: F401
 from biodance.threads import one_thread
 
 
-@pytest.fixture
-def as_in_a_stage() -> Iterator[None]:
-    """Run a test of what stages call as the stages run, with one thread: a second one, beside which another worker of
-    pytest computes, cost up to seventy times the processor time.
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol() -> Generator[None, object, object]:
+    """Run every test with its fixtures as the stages of the package run: with one thread. A second one, beside which
+    another worker of pytest computes, cost up to seventy times the processor time.
     """
     with one_thread():
-        yield
+        return (yield)
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,6 @@ from biodance.identification.posterior import find_posterior
 from biodance.records import Sip
 from biodance.spatial import point_mass
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 PLACE = np.array([[0.02, -0.2, 0.01], [0.0, 0.1, -0.03]])
 
 

@@ -358,7 +358,7 @@ def test_the_page_rests_shows_first_and_speaks_only_when_asked_by_a_voice_of_thi
     browser.until("!playing")
     assert browser.run("[by('now').textContent, pausing]") == ["Rest. Let the arms down", "rest"]
     browser.run("run(true)")
-    assert browser.run("[pausing, wait]") == ["back", 5]
+    assert browser.run("[pausing, Math.round(wait)]") == ["back", 5]
     browser.until("spoken.at(-1).startsWith('Take up posture 2 again. Next:')", 10.0)
 
 

@@ -10,8 +10,6 @@ from biodance.effects import Case
 from biodance.inference.contact import one_sided, quick
 from biodance.motion.kinematics import poses
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 CAUSES = (
     "plate_gain",
     "plate_offset",

@@ -17,8 +17,6 @@ from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.sets import hypothesis
 from biodance.observations import Observation
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 FAST = ("plate_gain", "plate_offset", "time_delay", "body_mass")
 
 

@@ -12,8 +12,6 @@ from biodance.diagnosis.consequence import matters
 from biodance.effects import NamedCause, effects
 from biodance.inference.decision import _is_large
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
 
 

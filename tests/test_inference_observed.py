@@ -14,8 +14,6 @@ from biodance.inference.sets import Search, hypothesis
 from biodance.observations import observe, recording
 from biodance.uncertainty.tolerances import shipped
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 
 def size_of(evidence, names):
     """Return what observations alone say of the size of a cause, with its standard deviation."""

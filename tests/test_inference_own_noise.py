@@ -11,8 +11,6 @@ from biodance.records import CHANNELS
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 BLOCKS = len(BANDS) * len(CHANNELS)
 EXPECTED = np.array([[4.0, 1.0, 0, 0, 0, 0], [1.0, 9.0, 0, 0, 0, 0], *np.eye(6)[2:]])
 """N²: what noise of a coefficient is expected in every band, two channels together."""

@@ -24,8 +24,6 @@ from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.observations import ObservableCause, Observation
 from biodance.uncertainty.bands import BANDS
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 OFFSET = ("plate_offset", "Fx")
 SIZE = 0.3
 """N, tolerance of a plate's zero in `known`."""

@@ -25,8 +25,6 @@ from biodance.inference.scales import (
     products,
 )
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 SCALES = (
     Scales(np.zeros(3), 0.0, np.zeros(0)),
     Scales(np.array([0.4, -0.2, 0.9]), 0.0, np.zeros(0)),

@@ -18,8 +18,6 @@ from biodance.identification.statistics import standing_point
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Sip, Wrench
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 FAST = (
     "plate_gain",
     "plate_offset",

@@ -18,8 +18,6 @@ from biodance.inference.scales import LOUD as LOUDNESS
 from biodance.inference.sets import hypothesis, infer, screen
 from biodance.inference.unknown import EXCESS, OWN, P_UNKNOWN, energies, with_unknown
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 
 class Likely(Drawn):
     """A cause that is in nine sessions of ten."""

@@ -6,8 +6,6 @@ from inferred_sessions import inferred
 
 from biodance.diagnosis.reasons import Reason
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
 
 

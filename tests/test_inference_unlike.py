@@ -8,8 +8,6 @@ from inferred_sessions import inferred
 from biodance.effects import Case, Effect, Parameter, effects
 from biodance.records import Array
 
-pytestmark = pytest.mark.usefixtures("as_in_a_stage")
-
 HERTZ = 1.3
 
 
