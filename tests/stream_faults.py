@@ -19,6 +19,8 @@ def _of_plate(trial: Trial, at: float, change: Callable[[Array, int], None]) -> 
 
 
 def offset(trial: Trial, at: float) -> tuple[Trial, str, str]:
+    """Return the trial whose plate reads 30 N too much from ``at`` s on, with target and effect that name it."""
+
     def push(value: Array, row: int) -> None:
         value[row:, 2] += 30.0
 
@@ -26,6 +28,8 @@ def offset(trial: Trial, at: float) -> tuple[Trial, str, str]:
 
 
 def silent(trial: Trial, at: float) -> tuple[Trial, str, str]:
+    """Return the trial whose plate says the same from ``at`` s on, with target and effect that name it."""
+
     def silence(value: Array, row: int) -> None:
         value[row:] = value[row - 1]
 
@@ -38,6 +42,7 @@ def _with_markers(trial: Trial, xyz: Array) -> Trial:
 
 
 def exchanged(trial: Trial, at: float) -> tuple[Trial, str, str]:
+    """Return the trial whose pelvis labels are exchanged from ``at`` s on, with target and effect that name it."""
     assert trial.markers is not None
     xyz, rows = np.array(trial.markers.xyz), trial.markers.time >= at
     left, right = (trial.markers.names.index(name) for name in ("LASI", "RASI"))
@@ -46,6 +51,7 @@ def exchanged(trial: Trial, at: float) -> tuple[Trial, str, str]:
 
 
 def moved(trial: Trial, at: float) -> tuple[Trial, str, str]:
+    """Return the trial whose knee marker sits 0.12 m lower from ``at`` s on, with target and effect that name it."""
     assert trial.markers is not None
     xyz, rows = np.array(trial.markers.xyz), trial.markers.time >= at
     xyz[rows, trial.markers.names.index("LKNE"), 2] -= 0.12

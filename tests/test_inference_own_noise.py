@@ -1,12 +1,20 @@
-"""The noise of a session as it shows it, of rows that were drawn with noise of a known size."""
+"""The noise of a session as it shows it: of rows that were drawn with noise of a known size, and of real walks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from inferred_rows import DrawnRows, rows
 
+from biodance.diagnosis.own_tolerances import own_tolerances
+from biodance.effects import causes
 from biodance.inference.own_noise import own_noise
+from biodance.inference.rows import rows_of
+from biodance.inference.session import see
+from biodance.lab.session.read import read_session
+from biodance.pipeline.judged_trials import chosen_windows
+from biodance.pipeline.session import examine
 from biodance.records import CHANNELS
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
@@ -71,3 +79,17 @@ def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
     own = shown(replace(found, y=y))
     assert own[7] == pytest.approx(0.95, rel=0.2)
     assert np.delete(own, 7).max() == pytest.approx(0.5)  # none is believed to be quieter
+
+
+@pytest.mark.parametrize("name", ["biomechzoo/HC032A", "opensim_models/raj_walk", "c3d_parser_Sydney"])
+def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(name: str, data: Path) -> None:
+    """A session each of three laboratories: in most bands and channels, not in all."""
+    result = examine(read_session(data / name))
+    windows, known = chosen_windows(result.trials), causes()
+    own = own_tolerances(result.body, windows, result.session.trials).tolerances
+    seen = see(result.body, windows, own, known, None)
+    found = own_noise(rows_of(seen.problem, seen.causes, own, None)).noise
+    white = np.linalg.inv(np.linalg.cholesky(own.noise))
+    share = np.sqrt(np.einsum("bcc->bc", white @ found @ white.swapaxes(1, 2)))
+    assert np.median(share) < 0.9  # the shortest walk has 108 rows, which say little of 30 sizes
+    assert share.max() > 0.9

@@ -14,8 +14,6 @@ _FREQUENCY = 1.5
 _RANGE = (0.7, 3.0)
 """Hz: from a bath to a cup."""
 _DAMPING = 0.08
-_WHOLE = 1.5
-"""Share of a load that may be found to slosh: all of a bag that swings, and what both sizes err by."""
 _CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
 _LEAST = 0.1
 """kg that matter: as an added mass."""
@@ -98,8 +96,8 @@ class SloshingLoad(Effect):
         return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz"), high
 
     def possible(self, theta: Array) -> bool:
-        """Return whether the load weighs something, and what moves in it something, and no more than the load."""
-        return bool(theta[0] > 0 and 0 < theta[1] <= _WHOLE * theta[0])
+        """Return whether what moves in the load weighs something, and no more than the load, of which it is a part."""
+        return bool(0 < theta[1] <= theta[0])
 
     def possible_in(self, case: Case, theta: Array) -> bool:
         """Return whether the load hangs at its segment, not beyond its ends."""

@@ -21,7 +21,7 @@ from biodance.uncertainty.tolerances import Tolerances
 _ROUNDS, _NEAR = 10, 0.03
 _QUIETEST = 0.5
 """Share of the expected noise below which none is believed: beside less, what is no fault has to be larger than it was
-learned to be (sag 4.6 times in postures, where a plate was then 50 mm too high at P = 0.87 to 0.98).
+learned to be (flesh that sags, 4.6 times in simulated postures). At 0.2 real sessions give the same names.
 """
 
 

@@ -22,13 +22,13 @@ from biodance.effects import Effect
 from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
+from biodance.uncertainty.tolerances import Tolerances, between_laboratories, key_of, whitened
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
 BODY, FIXED, TOLERATED = "body", "fixed", "tolerances"
 """Groups of columns: the parameters of the body; errors that several observations share, and causes whose tolerance is
-their spread between real laboratories (`Tolerances.between`), which have no scale; causes within other tolerances: a
+their spread between real laboratories (`between_laboratories`), which have no scale; causes within other tolerances: a
 laboratory is careful in all of them, or in none."""
 SOFT = ("slide", "flesh", "sag", "tilt", FilterMismatch.name)
 """Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
@@ -186,7 +186,7 @@ def rows_of(
     tolerated = tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
     if problem is None:
         X, y = np.zeros((0, len(tolerated))), np.zeros(0)
-        names = [_group(key_of(*one.names), tolerances) for one in tolerated]
+        names = [_group(key_of(*one.names)) for one in tolerated]
         units: _Units = {
             one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
             for k, one in enumerate(tolerated)
@@ -227,7 +227,7 @@ def _simulated(
     units = {
         name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
     }
-    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key, tolerances) for key in known.keys], units
+    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key) for key in known.keys], units
 
 
 def _with_observations(
@@ -248,11 +248,11 @@ def _with_observations(
     return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[FIXED] * shared.shape[1]]
 
 
-def _group(key: str, tolerances: Tolerances) -> str:
+def _group(key: str) -> str:
     """Return the group of a key: what is alike in kind is as large, or as small, together; what was learned between
     laboratories holds in this one as it is.
     """
-    if key in tolerances.between:
+    if key in between_laboratories():
         return FIXED
     kind = key.removeprefix("habit ").split()[0]
     return kind if kind in SOFT else TOLERATED

@@ -80,8 +80,7 @@ class Tolerances:
     effect: share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite
     like its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
     beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
-    the plates' zero, an error like the other sizes: it hides causes, and no noise does; ``between`` the keys of
-    ``sizes`` that are a spread between real laboratories.
+    the plates' zero, an error like the other sizes: it hides causes, and no noise does.
     """
 
     sizes: Mapping[str, float]
@@ -94,7 +93,6 @@ class Tolerances:
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
     norms: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     zeros: Array = field(default_factory=lambda: np.zeros(()))
-    between: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
@@ -136,8 +134,7 @@ def shipped() -> Tolerances:
     which).
     """
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
-    between = frozenset(_row_key(row) for row in error_rows() if row["learned_on"] == _BETWEEN)
-    return without_habits(replace(rest, sizes=table_sizes(), between=between))
+    return without_habits(replace(rest, sizes=table_sizes()))
 
 
 _PHYSICS = ("sag ",)
@@ -167,19 +164,22 @@ def without_habits(found: Tolerances) -> Tolerances:
 
 _BETWEEN = "real_laboratories"
 _LEARNED = ("null_sessions", "family", _BETWEEN)
-"""Where the sizes were learned by which sessions without fault are judged; of them the spreads between laboratories."""
+"""Where the sizes were learned by which sessions without fault are judged."""
+
+
+@cache
+def between_laboratories() -> frozenset[str]:
+    """Return the keys of sizes that are a spread between real laboratories."""
+    return frozenset(_key(row) for row in error_rows() if row["learned_on"] == _BETWEEN)
 
 
 def table_sizes() -> dict[str, float]:
-    """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and
-    those of joints before any functional calibration.
-    """
-    used = (row for row in error_rows() if row["learned_on"] in _LEARNED or row["quantity"] in CALIBRATED)
-    return {_row_key(row): float(row["sd"]) for row in used}
+    """Return by key the sizes that sessions without fault are judged by: learned ones, and of joints as marked."""
+    return {_key(r): float(r["sd"]) for r in error_rows() if r["learned_on"] in _LEARNED or r["quantity"] in CALIBRATED}
 
 
-def _row_key(row: Mapping[str, str]) -> str:
-    """Return the key of a row of the table of sizes."""
+def _key(row: Mapping[str, str]) -> str:
+    """Return the key of a row of the table."""
     key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
     return key + (BEFORE if row["state"] == "before" else "")
 
