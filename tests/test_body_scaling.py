@@ -21,6 +21,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Source, Subject, Trial
+from biodance.records.attention import NOT_USED
 from biodance.spatial import elementary_rotation
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
@@ -218,3 +219,15 @@ def test_real_people_are_scaled_and_stand_under_their_markers(folder: str, data:
     assert np.median(np.linalg.norm(found - measured, axis=1)) < 0.003
     assert smallest_eigenvalues(body.sip.phi).min() > 0
     assert body.sip.mass.sum() == pytest.approx(session.subject.mass)
+
+
+def test_a_typed_leg_that_the_markers_contradict_is_refused_aloud_and_does_not_move_the_hips() -> None:
+    trial = standing_trial()
+    shown = scaled(SUBJECT, trial)[0]
+    legs = measure_static(SUBJECT, trial).sizes.leg_length
+    typed = {"LLegLength": legs["left"] - 0.1, "RLegLength": legs["right"] - 0.01}
+    wrong = scaled(SUBJECT, replace(trial, measurements=typed))[0]
+    (said,) = (note for note in wrong.notes if note.startswith(NOT_USED))
+    assert "LLegLength was typed as" in said
+    hip = wrong.joint_index("left_hip_flexion")
+    assert np.linalg.norm(wrong.joints[hip].translation - shown.joints[hip].translation) < 0.002

@@ -135,8 +135,10 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
-    found += [Attention("warn", text.removeprefix(WARNING), "", "session.toml") for text in result.slips]
-    found += [Attention("warn", text.removeprefix(WARNING), "", "body") for text in result.doubts]
+    warned = {"session.toml": result.slips, "body": (*result.doubts, *result.unused)}
+    found += [
+        Attention("warn", text.removeprefix(WARNING), "", about) for about, said in warned.items() for text in said
+    ]
     said = [_of_trial(trial, findings) for trial in result.trials]
     found += [line for lines in said for line in lines]
     told = any(_WEIGHED in line.text for lines in said for line in lines)

@@ -22,7 +22,7 @@ from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
 from biodance.motion.track import track
 from biodance.pipeline.trial import attempt, track_trial
-from biodance.pipeline.trial_result import ForceGain, ShownJoints, Step, TrialResult
+from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, ShownJoints, Step, TrialResult
 from biodance.records import SIDES, Markers, Sip, Subject, Trial
 from biodance.settings import Settings
 from biodance.uncertainty.caution import in_other_frames
@@ -50,15 +50,23 @@ def body_of(
     for static in statics:
         scaling = attempt(steps, "scale", partial(measure_static, subject, static))
         if scaling is not None:
-            moved_in = any(one.trial.role == "fit" and one.trial.markers is not None for one in read)
-            functional = settings.joints == "functional" and moved_in
-            placed = attempt(steps, "joints", partial(calibrate_joints, scaling, read)) if functional else None
-            moved = placed is not None and any(note.startswith(PLACED) for note in placed.notes)
-            how = f"{PLACED[:1].lower()}{PLACED[1:]}" if moved else "joints where it shows them"
-            return (placed or scaling).body()[0], (
+            scaling, how = _placed(scaling, read, settings, steps)
+            return scaling.body()[0], (
                 f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )
     return _without_static(subject, read, settings, steps, had_static=bool(statics))
+
+
+def _placed(
+    scaling: Scaling, read: tuple[TrialResult, ...], settings: Settings, steps: list[Step]
+) -> tuple[Scaling, str]:
+    """Return the scaling with its joints where the movement shows them, if it does, and what places them in words."""
+    moved_in = any(one.trial.role == "fit" and one.trial.markers is not None for one in read)
+    functional = settings.joints == "functional" and moved_in
+    placed = attempt(steps, "joints", partial(calibrate_joints, scaling, read)) if functional else None
+    moved = placed is not None and any(note.startswith(PLACED) for note in placed.notes)
+    how = f"{PLACED[:1].lower()}{PLACED[1:]}" if moved else "joints where it shows them"
+    return placed or scaling, how
 
 
 def _without_static(
@@ -78,14 +86,21 @@ def _without_static(
     generic = partial(human, subject, table=settings.table, markers=worn[0].marker_set, gravity=settings.gravity)
     tables = f"masses and inertias from the table {settings.table}."
     body = attempt(steps, "body from stature", lambda: with_tracking_limits(generic()))
-    choices = [(body, f"From stature alone, with the usual places of the markers; {tables}")] if body else []
+    usual = f"From stature alone, with the usual places of the markers; {tables}"
+    choices = [(body, usual, list[Step]())] if body else []
     for trial in worn:
         scaling = attempt([], "scale", partial(measure_static, subject, trial))
         if scaling is not None:
-            said = f"Scaled on one frame of {trial.name}, with both feet on the ground; {tables}"
-            choices.append((scaling.body()[0], said))
+            done = [Step(ON_A_FRAME, "done")]
+            scaling, how = _placed(scaling, read, settings, done)
+            said = f"Scaled on one frame of {trial.name}, with both feet on the ground, {how}; {tables}"
+            choices.append((scaling.body()[0], said, done))
             break
-    return min(choices, key=lambda choice: _distance(choice[0], worn[0]), default=(None, "No body."))
+    if not choices:
+        return None, "No body."
+    body, said, done = min(choices, key=lambda choice: _distance(choice[0], worn[0]))
+    steps += done
+    return body, said
 
 
 def _distance(body: Body, trial: Trial) -> float:

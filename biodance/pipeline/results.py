@@ -24,9 +24,9 @@ from biodance.lab.corrections import PlateCorrection
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.placed import Placed
-from biodance.pipeline.trial_result import Check, ShownJoints, Step, Still, TrialResult, Weighing
+from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing
 from biodance.records import Session, Sip, Subject, by_name
-from biodance.records.attention import WARNING
+from biodance.records.attention import NOT_USED, WARNING
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -111,8 +111,12 @@ class SessionResult:
 
     @property
     def scaled(self) -> bool:
-        """Whether a static trial scaled the body."""
-        return any(step.name == "scale" and step.status == "done" for step in self.steps)
+        """Whether the person's own markers scaled the body: on a static trial, or on a frame of a moving one if they
+        show every joint (what an unseen arm does, and where a moving body stands, is too much to guess together).
+        """
+        done = {step.name for step in self.steps if step.status == "done"}
+        shown = self.body is not None and bool(self.body.free.all())
+        return "scale" in done or (ON_A_FRAME in done and shown)
 
     def __getitem__(self, name: str) -> TrialResult:
         """Return what was found in the trial of that name; UnknownName lists all names."""
@@ -169,8 +173,13 @@ class SessionResult:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What the body's notes warn about: contradictory measures, improbable lengths, misplaced markers."""
+        """What the body's notes warn about: improbable lengths, misplaced markers."""
         return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """What was typed of the subject and contradicted by the markers, so that theirs was taken."""
+        return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith(NOT_USED))
 
     @property
     def slips(self) -> tuple[str, ...]:
@@ -185,16 +194,9 @@ class SessionResult:
     @property
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about, not computed or outside its limit."""
-        trouble = (
-            bool(self.failures)
-            or any(step.status != "done" for step in self.steps)
-            or any(t.status != "ok" for t in self.trials)
-        )
-        return (
-            trouble
-            or bool(self.session.refused or self.doubts or self.slips)
-            or any(not check.inside for check in self.all_checks)
-        )
+        said = self.failures or self.session.refused or self.doubts or self.unused or self.slips
+        undone = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
+        return bool(said) or undone or any(not check.inside for check in self.all_checks)
 
 
 @dataclass(frozen=True, eq=False)

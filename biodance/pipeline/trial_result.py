@@ -40,6 +40,10 @@ class Step:
     text: str = ""
 
 
+ON_A_FRAME = "scale on a frame"
+"""Name of the step that scales a body on one frame of a moving trial, without a static one."""
+
+
 @dataclass(frozen=True, eq=False)
 class MarkerFit:
     """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen;

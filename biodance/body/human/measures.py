@@ -10,6 +10,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import LANDMARKS, MarkerSet, canonical, landmark, read_marker_set
 from biodance.lab.markers.upright import WINDOW, posture_frames
 from biodance.records import SIDES, Array, Markers, Subject, Trial
+from biodance.records.attention import NOT_USED, WARNING
 
 _NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
@@ -204,7 +205,7 @@ def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, 
 
 _MARKER_DIAMETER = 0.014  # m, where the file does not say: the usual marker of plug-in gait
 _ASIS_BETWEEN, _LEG_BETWEEN = (-0.024, 0.054), (-0.040, 0.040)
-"""m: how much farther apart markers are than a typed measure without a warning. The distance of the spines is typed of
+"""m: how much farther apart markers are than a typed measure that is used. The distance of the spines is typed of
 bone and marked on skin, which lies outside of it: 15 mm (sd 13) in 15 persons of 6 public laboratories, here with three
 standard deviations; of legs 0 mm (sd 15) in 16.
 """
@@ -237,9 +238,10 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
     place = posture.landmarks
     middle = (place["right_asis"] + place["left_asis"]) / 2
     width = float(np.linalg.norm(place["right_asis"] - place["left_asis"]))
-    notes, guessed = _contradictions(given, width, place), list[str]()
-    diameter = given.get("markerdiameter")
-    if diameter is None:
+    (contradicted, doubt), guessed = _contradicted(given, width, place), list[str]()
+    notes = [*filter(None, [doubt]), *contradicted.values()]
+    given = {name: value for name, value in given.items() if name not in contradicted}
+    if (diameter := given.get("markerdiameter")) is None:
         notes.append(f"Marker diameter is not in the file: {1e3 * _MARKER_DIAMETER:.0f} mm taken.")
     legs = {side: given.get(f"{_LETTER[side]}leglength".lower(), _marker_leg(place, side)) for side in _LETTER}
     widths, offsets = {}, {}
@@ -277,16 +279,22 @@ def _marker_leg(place: Mapping[str, Array], side: str) -> float:
     return float(np.linalg.norm(asis - knee) + np.linalg.norm(knee - ankle))
 
 
-def _contradictions(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> list[str]:
-    """Return a warning for every typed measure that the markers contradict."""
-    checks = [("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)]
-    for side, letter in _LETTER.items():
-        checks.append(
-            (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), _marker_leg(place, side), _LEG_BETWEEN)
-        )
-    return [
-        f"Warning: {name} was typed as {1e3 * typed:.0f} mm, the markers are {1e3 * seen:.0f} mm apart: check "
-        f"both, measure again."
-        for name, typed, seen, (low, high) in checks
-        if typed is not None and not low <= seen - typed <= high
-    ]
+def _contradicted(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> tuple[dict[str, str], str]:
+    """Return the typed lengths of legs that the markers contradict, by their name in ``given``, and what to do; and a
+    warning where they contradict the typed width of the pelvis, of which the markers' is used anyway ("" if not).
+    """
+    legs = {
+        name.lower(): f"{NOT_USED}{said}"
+        for side, name in ((side, f"{letter}LegLength") for side, letter in _LETTER.items())
+        if (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
+    }
+    said = _unlike("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)
+    return legs, f"{WARNING}{said}" if said else ""
+
+
+def _unlike(name: str, typed: float | None, seen: float, between: tuple[float, float]) -> str:
+    """Return in words that markers contradict a measure; "" if they do not."""
+    if typed is None or between[0] <= seen - typed <= between[1]:
+        return ""
+    apart = f"the markers are {1e3 * seen:.0f} mm apart"
+    return f"{name} was typed as {1e3 * typed:.0f} mm, {apart}: check both, measure again."
