@@ -14,7 +14,7 @@ from biodance.body.export.csv import STANDARD
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.effects import QualityCheck
-from biodance.lab.opensim_tables import read_mot
+from biodance.lab.program_tables import read_mot
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
 SAID = "A and B carry each other's names. Exchange them, or accept the correction."

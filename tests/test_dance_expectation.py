@@ -8,7 +8,7 @@ import pytest
 from small_dances import BODY
 
 from biodance.body.human.human import human
-from biodance.body.robot.hoap3 import hoap3
+from biodance.body.similarity import hoap3
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import (
@@ -31,7 +31,7 @@ from biodance.identification.mismatch import mismatch, temper
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.dynamics import predict_wrench, regressor
-from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.dance import DanceResult
 from biodance.records import Motion, Subject
 from biodance.report.dance import dance_document
 from biodance.uncertainty.caution import widened_prior

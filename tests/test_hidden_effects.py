@@ -16,7 +16,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.identification.physical import FailedFit
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 
 def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

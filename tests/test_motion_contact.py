@@ -339,7 +339,7 @@ def test_the_soles_of_a_tracked_body_serve_as_well() -> None:
 )
 def test_real_trials(file: str, mass: float, least: int, data: Path) -> None:
     from biodance.lab.prepare import prepare
-    from biodance.lab.read import read_trial
+    from biodance.lab.readers import read_trial
 
     trial = prepare(read_trial(data / file))
     assert trial.markers is not None

@@ -10,7 +10,7 @@ from identified_sessions import body, session_result, truth
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.identification import can_identify, identify_trials
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.session import identification_of
 from biodance.records import Plate, Wrench
 from biodance.report.pages.identification import identification_section
@@ -60,7 +60,7 @@ def test_the_document_has_the_keys_that_programs_rely_on(numbers, found):
 
 
 def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
-    from biodance.body.inertia import rigid_inertia
+    from biodance.body.parts import rigid_inertia
 
     lump = rigid_inertia(found.identification.sip.of("left_thigh"))
     row = numbers["segments"][body().segment_index("left_thigh")]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from example_results import full_session, refused_session
 
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.saved_results import provenance
 from biodance.report.pages.template import html_table
 from biodance.report.tables.schema import Schema, markdown_table, plain_values, shown, to_text
 from biodance.report.tables.session import results_document

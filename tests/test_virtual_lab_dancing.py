@@ -23,12 +23,11 @@ from biodance.dance.search.postures import KEPT, distance_from, initial_guess, s
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
-from biodance.pipeline.simulate_dance import simulate_dance, stretches
+from biodance.pipeline.front_dance import simulate_dance, stretches
 from biodance.records import SIDES, Subject
-from biodance.virtual_lab.movement.dancing import _JOINTS, PERFORMERS, Performer, copy_dance
-from biodance.virtual_lab.movement.performance import true_wrench
+from biodance.virtual_lab.movement.performance import _JOINTS, PERFORMERS, Performer, copy_dance, true_wrench
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.tolerances import PERFECT
+from biodance.virtual_lab.person.skeleton import PERFECT
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 BODY = replace(human(SUBJECT), limits=joint_limits(SUBJECT, within="comfortable"))

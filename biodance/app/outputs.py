@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.sessions import SessionPlace
-from biodance.batch.outcome import TABLES
 from biodance.batch.summary import folder_name
+from biodance.batch.work import TABLES
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.plain_text import for_spreadsheet

@@ -23,7 +23,7 @@ from biodance.app.edits import ChangedElsewhereError
 from biodance.app.guard import LARGEST_BODY, LoopbackGuard
 from biodance.app.sessions import Archive
 from biodance.app.window import Asked, Window
-from biodance.batch.engines import prepare_workers
+from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
 from biodance.report.pages.template import three_js
 

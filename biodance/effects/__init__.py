@@ -1,7 +1,7 @@
 """FAMILY: one candidate cause of disagreement per file, found automatically: to extend the model, add one file.
 
 The diagnosis fits these causes. The virtual lab makes its faults by OTHER code
-(``virtual_lab/faults/recording_faults.py``, ``causes.py``): what is hidden is not made by the formula that finds it.
+(``virtual_lab/recording_faults.py``, ``causes.py``): what is hidden is not made by the formula that finds it.
 The name of an effect is the name of its file, which gives it as ``EFFECT``; the contract is `Effect` for causes that
 have columns and are fitted, `DiscreteEffect` for those that a look at the recording settles before any statistics.
 Other packages join by the entry points ``biodance.effects``, objects as arguments of ``diagnose``.

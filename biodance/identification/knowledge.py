@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.display import Interval
 from biodance.identification.posterior import BodyPosterior
 from biodance.records import Array, Sip

@@ -451,13 +451,9 @@ def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> dict[str, Wre
     """
     parts = []
     for index, plate in enumerate(trial.plates):
-        parts.append(distribute(plate.wrench, *_on_ground(soles, plate.height), contact.on_plate[:, :, index]))
+        # The centres of the right and the left sole (T, 3) m, moved vertically to the plate's height.
+        centre = soles.centre.copy()
+        centre[..., 2] = plate.height
+        parts.append(distribute(plate.wrench, centre[:, 0], centre[:, 1], contact.on_plate[:, :, index]))
     total = (np.sum([part[foot].value for part in parts], axis=0) for foot in range(len(SIDES)))
     return {f"{side}_foot": Wrench(trial.wrench.time, value) for side, value in zip(SIDES, total, strict=True)}
-
-
-def _on_ground(soles: Soles, height: float) -> tuple[Array, Array]:
-    """Return the centres of the right and the left sole (T, 3) m, moved vertically to the plate's height."""
-    centre = soles.centre.copy()
-    centre[..., 2] = height
-    return centre[:, 0], centre[:, 1]

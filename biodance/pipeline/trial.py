@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.optional_joints import marker_groups
+from biodance.body.human.skeleton import marker_groups
 from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
@@ -19,7 +19,7 @@ from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.prepare import prepare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.dynamics import compare, predict_wrench
-from biodance.motion.quiet_standing import quiet_standing
+from biodance.motion.newton import quiet_standing
 from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.track import track, with_own_cutoff
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit

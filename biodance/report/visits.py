@@ -12,11 +12,10 @@ from rich.console import Console
 
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
+from biodance.cycles.summary import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
-from biodance.pipeline.provenance import now, provenance
-from biodance.pipeline.visit_quantities import ComparedQuantity, Untested
-from biodance.pipeline.visits import VisitComparison
+from biodance.pipeline.saved_results import now, provenance
+from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
 from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
 from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.files import for_spreadsheets, write_files

@@ -16,24 +16,25 @@ from biodance.errors import BiodanceError
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Subject
 from biodance.threads import one_thread
-from biodance.virtual_lab.faults.forces import wobbling_mass
+from biodance.virtual_lab.causes import wobbling_mass
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.person.prosthesis import with_prostheses
+from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.laboratory import SWINGING, Laboratory, soft_parts
-from biodance.virtual_lab.recording.visit import (
+from biodance.virtual_lab.truth import CARRIERS, truth
+from biodance.virtual_lab.visit import (
     FIRST_VISIT,
+    SWINGING,
     Instruments,
+    Laboratory,
     LabVisit,
     perform_in,
     record,
     scale_reading,
     set_up,
+    soft_parts,
     write,
 )
-from biodance.virtual_lab.truth import CARRIERS, truth
 
 TRUTH = "truth"
 """Name of the folder inside a simulated session that holds the truth."""

@@ -13,9 +13,9 @@ import numpy as np
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.c3d.write import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
-from biodance.virtual_lab.recording.instruments import HALF_SIZE
-from biodance.virtual_lab.recording.visit import Fault, Recording
-from biodance.virtual_lab.tolerances import stream
+from biodance.virtual_lab.instruments import HALF_SIZE
+from biodance.virtual_lab.person.skeleton import stream
+from biodance.virtual_lab.visit import Fault, Recording
 
 Builder = Callable[..., Fault]
 """Returns the fault of a ``target``; the sizes of the fault are its keywords, SI units."""

@@ -14,8 +14,15 @@ from biodance.records import SIDES, Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.movement.protocol import STAND
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, small_rotation, virtual_people
-from biodance.virtual_lab.tolerances import LabTolerances, smooth_noise, stream
+from biodance.virtual_lab.person.skeleton import (
+    ARM_AND_LEG,
+    TRUE_SEGMENTS,
+    LabTolerances,
+    small_rotation,
+    smooth_noise,
+    stream,
+    virtual_people,
+)
 
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""

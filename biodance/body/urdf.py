@@ -13,9 +13,18 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.changes import place_at_zero
 from biodance.body.export import refuse_impossible
-from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters, turn_inertia
-from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
-from biodance.body.robot.similarity import (
+from biodance.body.parts import (
+    NO_SEGMENT,
+    Foot,
+    Joint,
+    JointLimits,
+    RigidInertia,
+    SegmentMarkers,
+    combine_inertias,
+    inertial_parameters,
+    turn_inertia,
+)
+from biodance.body.similarity import (
     com_deviation,
     extended,
     is_point,
@@ -24,7 +33,7 @@ from biodance.body.robot.similarity import (
     robot_covariance,
     solid,
 )
-from biodance.body.robot.urdf_file import Connection, UrdfFile, match_faces, read_urdf_file, sole_outline
+from biodance.body.urdf_file import Connection, UrdfFile, match_faces, read_urdf_file, sole_outline
 from biodance.errors import BiodanceError, FileRefused, known_index
 from biodance.records import SIDES, Array, Sip
 

@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring
 
 import numpy as np
 
-from biodance.body.inertia import RigidInertia
+from biodance.body.parts import RigidInertia
 from biodance.body.solids import read_mesh
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
