@@ -48,7 +48,6 @@ ONE_ALGORITHM = {
     "pipeline/saved_results.py": "what a results folder keeps, and from what it was made",
     "pipeline/scenes.py": "what is drawn: instants, postures, trials as moving pictures",
     "pipeline/visits.py": "visits beside each other: their quantities, and what changed",
-    "pipeline/words.py": "findings, reasons and loads as sentences",
     "records/session.py": "who came, and what was recorded of him, checked at birth",
     "records/wrench.py": "what was measured: where it came from, markers, plates, the wrench of all of them",
     "virtual_lab/causes.py": "every cause that can be hidden, and the forces among them",

@@ -253,9 +253,9 @@ def _examined(
     """Return status, reason, rows and the hashes of the recordings of a session that goes through."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
-    from biodance.pipeline.words import as_diagnosed
     from biodance.report.files import write_tables
     from biodance.report.tables.frames import session_tables
     from biodance.report.write import write_report

@@ -95,8 +95,8 @@ def diagnose_command(
         return diagnose_robot(session, results, robot, for_people)
     from biodance.pipeline import front
     from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
-    from biodance.pipeline.words import as_diagnosed
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 

@@ -47,9 +47,9 @@ def report_session(
     """
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
-    from biodance.pipeline.words import as_diagnosed
     from biodance.report.write import write_report, write_subject_page
 
     found = None

@@ -26,9 +26,9 @@ from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out, recorded_of
+from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.words import with_load, with_weighed_load
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped

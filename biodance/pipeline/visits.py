@@ -22,11 +22,11 @@ from biodance.pipeline.attention import corrected_attention, session_attention
 from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.diagnosis import diagnosed_and_corrected
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.load import as_diagnosed
 from biodance.pipeline.movement import SessionMovement, session_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.pipeline.trial_result import Weighing
-from biodance.pipeline.words import as_diagnosed
 from biodance.records import Session, side_in_name
 from biodance.records.attention import Attention
 from biodance.uncertainty.visits import (
