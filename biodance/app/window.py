@@ -1,5 +1,6 @@
 """What the pages of a window ask for, each question a method; how they are asked is `server`'s."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from starlette.responses import Response
 from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
 from biodance.app.folders import allowed_folder, folders_document
 from biodance.app.outputs import (
+    CORRECTABLE,
     csv_archive,
     exported,
     page_part,
@@ -161,6 +163,22 @@ class Window:
             if kind == "csv":
                 return _attached(f"{stem}_tables.zip", csv_archive(place))
             return _attached(*exported(place, kind, asked.text("trial")))
+
+    def correction(self, asked: Asked) -> dict[str, Any]:
+        """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
+        place, wanted = self._place(asked), asked.body.get("findings")
+        found = (read_results(place)["diagnosis"] or {}).get("findings", [])
+        chosen = [
+            one for one in found if [one["effect"], one["target"]] in (wanted if isinstance(wanted, list) else [])
+        ]
+        if not chosen or any(one["effect"] not in CORRECTABLE for one in chosen):
+            legal = ", ".join(f"{one['effect']} {one['target']}" for one in found if one["effect"] in CORRECTABLE)
+            raise BiodanceError(f"findings must be some that session.toml can correct: {legal or 'there is none'}.")
+        asked_of = [{key: one[key] for key in ("effect", "target", "trials", "parameters")} for one in chosen]
+        with self._one_export:
+            return dict(
+                parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))
+            )
 
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""

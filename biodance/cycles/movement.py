@@ -9,7 +9,14 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.cycles.beside import AngleComparison, EventComparison, compare_angles, compare_events, file_curves
+from biodance.cycles.beside import (
+    AngleComparison,
+    EventComparison,
+    compare_angles,
+    compare_events,
+    emg_curves,
+    file_curves,
+)
 from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
 from biodance.cycles.cut import (
     PERCENT,
@@ -24,6 +31,7 @@ from biodance.cycles.cut import (
     replaced_events,
 )
 from biodance.cycles.ground import ground_curves
+from biodance.cycles.jumps import jumps
 from biodance.cycles.lifts import lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
@@ -37,7 +45,12 @@ from biodance.settings import STANDARD_GRAVITY
 if TYPE_CHECKING:
     import pandas as pd
 
-_WORDS = {"gait": ("gait cycle", "gait cycles"), "squat": ("squat", "squats"), "sit_to_stand": ("rise", "rises")}
+_WORDS = {
+    "gait": ("gait cycle", "gait cycles"),
+    "squat": ("squat", "squats"),
+    "sit_to_stand": ("rise", "rises"),
+    "jump": ("jump", "jumps"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +65,10 @@ class TrialMovement:
         Strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where they saw
         one, else of the markers.
     cycles : tuple of Cycle
-        Gait cycles of each foot, squats, rises from a chair.
+        Gait cycles of each foot, squats, rises from a chair, jumps.
     curves : tuple of CycleCurve
         Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
-        uncertain in them; pelvis, foot progression and centre of mass.
+        uncertain in them; pelvis, foot progression and centre of mass; envelopes of EMG channels (mV).
     strides : tuple of Stride
         Spatio-temporal values of every gait cycle.
     late : tuple
@@ -65,7 +78,7 @@ class TrialMovement:
     file_curves : tuple of CycleCurve
         Plug-in gait's own angles over the gait cycles.
     lifts : tuple of Stride
-        Depth, force share of the feet and rise of the force of every squat and rise.
+        Depth, height, force share of the feet and rise of the force of every squat, rise and jump.
     shared : tuple of Cycle
         Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
     notes : tuple of str
@@ -217,15 +230,20 @@ def trial_movement(
     if contact is not None and feet is not None:
         force = foot_events(feet, contact)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
-    found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
+    jumped = jumps(trial.name, motion, soles, centre, feet, contact.told if contact else None)
+    lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
+    found = (*gait_cycles(trial.name, events), *lifts, *jumped)
+    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     sure = _fully_measured(contact, motion.time.size)
+    whole: Mask = sure if contact is None else np.asarray(contact.told.all(axis=1))
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
-        theirs += file_curves(cycle, outputs, motion.time, own) if outputs else ()
+        if outputs:
+            theirs += file_curves(cycle, outputs, motion.time, own)
+            curves += emg_curves(cycle, outputs)
         if contact is not None and feet is not None:
             known = _known_loads(cycle, contact)
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
@@ -240,7 +258,7 @@ def trial_movement(
         compare_angles(body, motion, outputs) if outputs else (),
         compare_events(events, outputs) if outputs else (),
         tuple(theirs),
-        tuple(lift(one, centre, motion.time, weight, feet, sure) for one in cycles if one.kind != "gait"),
+        tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
         tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
         _notes(cycles, contact),
     )
@@ -272,7 +290,7 @@ def _inside(cycle: Cycle, contact: Contact) -> Mask:
 
 def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
     if not cycles:
-        return ("No step, no squat and no rise from a chair was found, so there are no cycles.",)
+        return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
     standing = [_inside(one, contact) for one in cycles if one.kind != "gait"]

@@ -64,16 +64,25 @@ class LabelsSwapped(DiscreteEffect):
 def named_exchanges(session: Session, found: Mapping[str, Mapping[Pair, Spans]]) -> tuple[QualityCheck, ...]:
     """Return a failed check for each pair ``found`` by trial, with one sentence for all that are exchanged alike."""
     places: dict[Pair, tuple[str, ...]] = {}
+    names: dict[Pair, tuple[str, ...]] = {}
     for trial in session.trials:
         for pair, spans in found.get(trial.name, {}).items():
             when = _when(trial.markers.time, spans) if trial.markers is not None else ""
             places[pair] = (*places.get(pair, ()), trial.name + when)
+            names[pair] = (*names.get(pair, ()), trial.name)
+    looked = tuple(trial.name for trial in session.trials if trial.markers is not None)
     alike: dict[tuple[str, ...], list[Pair]] = {}
     for pair, where in sorted(places.items()):
         alike.setdefault(where, []).append(pair)
     return tuple(
         QualityCheck(
-            _CHECK, False, _sentence(pairs, where), LabelsSwapped.name, "/".join(pair), advice=LabelsSwapped.advice
+            _CHECK,
+            False,
+            _sentence(pairs, where),
+            LabelsSwapped.name,
+            "/".join(pair),
+            advice=LabelsSwapped.advice,
+            trials=() if names[pair] == looked else names[pair],
         )
         for where, pairs in alike.items()
         for pair in pairs

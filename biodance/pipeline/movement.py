@@ -80,7 +80,7 @@ class SessionMovement:
 
     @cached_property
     def repetitions(self) -> Mapping[str, Repetitions]:
-        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand"), the kinds that there are."""
+        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand", "jump"), those there are."""
         kinds = dict.fromkeys(cycle.kind for one in self.trials for cycle in one.cycles)
         return {kind: repetitions_of(kind, self.trials) for kind in kinds}
 

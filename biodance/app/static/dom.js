@@ -66,7 +66,8 @@ async function answered(response) {
 }
 
 export const number = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
-export const words = (name) => name.replaceAll("_", " ");
+export const words = (name) =>
+  name.replace("trunk_head", "trunk with head").replace("forearm_hand", "forearm with hand").replaceAll("_", " ");
 export const chip = (text, kind = "") => h("span", { cls: `chip ${kind}` }, text);
 
 export function download(query, text) {

@@ -4,7 +4,7 @@ import { ask, h, say, tell } from "./dom.js";
 import { showSession } from "./session.js";
 
 const main = document.getElementById("main");
-const page = { turn: 0, name: "", revision: "", refresh: null, run: null };
+const page = { turn: 0, name: "", revision: "", refresh: null, run: null, queue: Promise.resolve(), waiting: new Set() };
 
 export function address(name, tab = "trials") {
   return name ? `#/${encodeURIComponent(name)}/${tab}` : "#/";

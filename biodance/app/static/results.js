@@ -143,34 +143,128 @@ function shownMarkers(one, { name, view }) {
 }
 
 function findings(rows, all) {
-  return h(
-    "table",
-    { cls: "stack" },
+  const place = h("div", { "aria-live": "polite" }),
+    able = rows.filter((one) => one.correctable);
+  const button = (some, text) =>
     h(
-      "thead",
-      {},
+      "button",
+      { onclick: () => correction(place, some, all), "data-key": `correct ${some.map((one) => one.target).join(" ")}` },
+      text,
+    );
+  return [
+    h(
+      "table",
+      { cls: "stack" },
       h(
-        "tr",
+        "thead",
         {},
-        ["Cause", "Size", "Probability", "What to do"].map((one) => h("th", { scope: "col" }, one)),
-      ),
-    ),
-    h(
-      "tbody",
-      {},
-      rows.map((one) =>
         h(
           "tr",
           {},
-          h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
-          h("td", { "data-label": "Size" }, size(one)),
-          h(
-            "td",
-            { cls: "n", "data-label": "Probability" },
-            one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
-          ),
-          h("td", { "data-label": "What to do" }, one.advice || "", " ", shownMarkers(one, all)),
+          ["Cause", "Size", "Probability", "What to do"].map((one) => h("th", { scope: "col" }, one)),
         ),
+      ),
+      h(
+        "tbody",
+        {},
+        rows.map((one) =>
+          h(
+            "tr",
+            {},
+            h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
+            h("td", { "data-label": "Size" }, size(one)),
+            h(
+              "td",
+              { cls: "n", "data-label": "Probability" },
+              one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
+            ),
+            h(
+              "td",
+              { "data-label": "What to do" },
+              one.advice || "",
+              " ",
+              shownMarkers(one, all),
+              one.correctable ? button([one], corrects(one)) : "",
+            ),
+          ),
+        ),
+      ),
+    ),
+    able.length > 1 ? h("div", { cls: "bar" }, button(able, `Correct all ${able.length} …`)) : "",
+    place,
+  ];
+}
+
+function corrects(one) {
+  // what the button beside a finding does
+  const [first, last] = (one.target || "").split("/"),
+    where = one.trials?.length ? one.trials.join(", ") : "all recordings";
+  if (one.effect === "labels_swapped") return `Exchange ${first} and ${last} in ${where} …`;
+  if (one.effect === "plates_exchanged") return `Exchange the channels of ${first} and ${last} …`;
+  return "Take the mass that the plates weighed …";
+}
+
+async function correction(place, some, { name, edit, page }) {
+  // what session.toml would say, before and after first; then it is written and the session run again
+  place.replaceChildren(h("p", {}, "Working out before and after …"));
+  try {
+    const told = await tell("correction", { name, findings: some.map((one) => [one.effect, one.target]) });
+    const write = async () => {
+      if (!(await edit(...told.changes))) return;
+      page.run = (await tell("run", { names: [name] })).run;
+      await page.refresh();
+    };
+    place.replaceChildren(
+      residuals(told.residuals),
+      h(
+        "p",
+        { cls: "small" },
+        "session.toml would say ",
+        told.changes.map(([keys, value]) => [h("code", {}, `${keys.join(".")} = ${JSON.stringify(value)}`), " "]),
+        "(Undo takes it back; your recordings stay as they are).",
+      ),
+      h(
+        "button",
+        { cls: "main", "data-key": "write", onclick: () => write().catch((error) => say(error.message)) },
+        "Write this and run again",
+      ),
+    );
+  } catch (error) {
+    say(error.message);
+    place.replaceChildren();
+  }
+}
+
+function residuals(rows) {
+  // what plates and simulation differ by, and the markers from the body, before and after
+  if (!rows.length) return "";
+  const head = ["Recording", "", ...CHANNELS, "Markers (mm)"].map((one) =>
+    h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
+  );
+  const line = (one, when) =>
+    h(
+      "tr",
+      {},
+      h("th", { scope: "row" }, one.trial),
+      h("td", {}, when),
+      one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
+    );
+  return h(
+    "div",
+    { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
+    h(
+      "table",
+      {},
+      h(
+        "caption",
+        {},
+        "What plates and simulation differ by (RMS; N, N·m), and markers and body, as it is and corrected",
+      ),
+      h("thead", {}, h("tr", {}, head)),
+      h(
+        "tbody",
+        {},
+        rows.flatMap((one) => [line(one, "before"), line(one, "after")]),
       ),
     ),
   );
@@ -199,39 +293,8 @@ function acceptance({ name, page }, found) {
     try {
       const told = await tell("accept", { name });
       corrected = told.written.some((one) => one.file.startsWith("corrected/"));
-      const head = ["Recording", "", ...CHANNELS].map((one) =>
-        h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
-      );
-      const line = (one, when) =>
-        h(
-          "tr",
-          {},
-          h("th", { scope: "row" }, one.trial),
-          h("td", {}, when),
-          one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
-        );
       place.replaceChildren(
-        told.residuals.length
-          ? h(
-              "div",
-              { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
-              h(
-                "table",
-                {},
-                h(
-                  "caption",
-                  {},
-                  "What plates and simulation differ by (RMS; N, N·m) as recorded, and with what was found taken off",
-                ),
-                h("thead", {}, h("tr", {}, head)),
-                h(
-                  "tbody",
-                  {},
-                  told.residuals.flatMap((one) => [line(one, "before"), line(one, "after")]),
-                ),
-              ),
-            )
-          : "",
+        residuals(told.residuals),
         told.written.length
           ? h(
               "div",
@@ -261,7 +324,11 @@ function acceptance({ name, page }, found) {
   return h(
     "div",
     {},
-    h("div", { cls: "bar" }, h("button", { onclick: look, "data-key": "accept" }, "Accept … show before and after")),
+    h(
+      "div",
+      { cls: "bar" },
+      h("button", { onclick: look, "data-key": "accept" }, "Accept all, in copies … show before and after"),
+    ),
     place,
   );
 }

@@ -21,6 +21,7 @@ from biodance.body.human.skeleton import (
 from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.choice import measured_whole, reference, studies, trunk_joint
+from biodance.display import spaced
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
@@ -157,7 +158,7 @@ def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
         by_source.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
     some = [f"{names} for {' and '.join(segments)}" for names, segments in by_source.items() if names]
     scanned = ["the scan for all segments"] if "scan" in told.get("pelvis", ()) else []
-    words = "; ".join([*some, *scanned]).replace("_", " ")
+    words = spaced("; ".join([*some, *scanned]))
     return (
         f"Shapes of the person weigh beside the table in the prior ({words}): girths as stadium solids (Yeadon 1990) "
         "and foot outlines about the mean of all tables, a scan by volume and density; other segments keep the table's "
