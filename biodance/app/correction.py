@@ -13,6 +13,7 @@ from typing import Any
 
 from biodance.app.edits import KeyChange, changed_text
 from biodance.app.residuals import residual_rows
+from biodance.effects import SessionEntry
 from biodance.effects.labels_swapped import exchanges
 from biodance.errors import BiodanceError
 from biodance.lab.session.file import FILES, read_session_file
@@ -38,7 +39,7 @@ def proposed_correction(folder: Path, findings: Sequence[_Finding]) -> dict[str,
         session.toml cannot correct one of them, or it is not found any more.
     """
     before = examine(read_session(folder))
-    changes = [change for one in findings for change in CORRECTIONS[one["effect"]](before, one)]
+    changes = [change for one in findings for change in CORRECTIONS[SessionEntry(one["session_entry"])](before, one)]
     joined = _together(changes)
     with _as_changed(folder, joined) as other:
         after = examine(read_session(other))
@@ -80,12 +81,14 @@ def _exchanged_labels(result: SessionResult, finding: _Finding) -> Iterator[KeyC
 def _exchanged_plates(result: SessionResult, finding: _Finding) -> Iterator[KeyChange]:
     """Yield the channels of two plates, each under the name of the other."""
     names = finding["target"].split("/")
-    of = next((trial for trial in result.session.trials if set(names) <= {one.name for one in trial.plates}), None)
-    if of is None or finding["trials"]:
+    if finding["trials"]:
         raise BiodanceError(
             f"{' and '.join(names)}: session.toml describes plates for all recordings alike, and they are exchanged in "
-            f"{', '.join(finding['trials']) or 'none'} alone. Accept the correction: it writes copies."
+            f"{', '.join(finding['trials'])} alone. Accept the correction: it writes copies."
         )
+    of = next((trial for trial in result.session.trials if set(names) <= {one.name for one in trial.plates}), None)
+    if of is None:
+        raise BiodanceError(f"{' and '.join(names)}: no recording has both plates now. Run the session again.")
     for name, other in zip(names, reversed(names), strict=True):
         yield ["plates", name, "channels"], _channels(of, other)
 
@@ -105,12 +108,12 @@ def _weighed_mass(result: SessionResult, finding: _Finding) -> Iterator[KeyChang
     yield ["subject", "mass_kg"], round(person.mass - sum(person.devices.values()) + error, 1)
 
 
-CORRECTIONS: Mapping[str, Callable[[SessionResult, _Finding], Iterator[KeyChange]]] = {
-    "labels_swapped": _exchanged_labels,
-    "plates_exchanged": _exchanged_plates,
-    "body_mass": _weighed_mass,
+CORRECTIONS: Mapping[SessionEntry, Callable[[SessionResult, _Finding], Iterator[KeyChange]]] = {
+    SessionEntry.EXCHANGE: _exchanged_labels,
+    SessionEntry.CHANNELS: _exchanged_plates,
+    SessionEntry.MASS: _weighed_mass,
 }
-"""Effect -> the changes of session.toml that take it off."""
+"""What of session.toml takes a finding off -> the changes of it."""
 
 
 @contextmanager

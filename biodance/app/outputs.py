@@ -41,9 +41,7 @@ EXPORTS: Mapping[str, str] = {
 """Formats that are offered, and the ending of their file; "" = a folder, handed out as .zip."""
 _OF_TRIALS = ("c3d", "trc", "mot")
 _SHOWN = ("attention", "judged", "checks", "subject", "mass_check", "refused", "steps")
-_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice")
-CORRECTABLE = ("labels_swapped", "plates_exchanged", "body_mass")
-"""Causes that session.toml can take off (`correction`)."""
+_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice", "session_entry")
 
 
 def read_results(place: SessionPlace) -> dict[str, Any]:
@@ -72,10 +70,7 @@ def shown_results(place: SessionPlace) -> dict[str, Any]:
         **{key: found.get(key) for key in _SHOWN},
         "status": told.get("status"),
         "reasons": told.get("reasons", []),
-        "findings": [
-            {key: one.get(key) for key in _FINDING} | {"correctable": one["effect"] in CORRECTABLE}
-            for one in told.get("findings", [])
-        ],
+        "findings": [{key: one.get(key) for key in _FINDING} for one in told.get("findings", [])],
         "trials": [{key: one[key] for key in ("name", "role", "status", "reason")} for one in found["trials"]],
         "moved": [{key: one[key] for key in ("trial", "events", "cycles")} for one in moved],
         "files": sorted(kept.manifest.outputs) if kept else [],

@@ -12,7 +12,6 @@ from starlette.responses import Response
 from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
 from biodance.app.folders import allowed_folder, folders_document
 from biodance.app.outputs import (
-    CORRECTABLE,
     csv_archive,
     exported,
     page_part,
@@ -168,13 +167,11 @@ class Window:
         """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
         place, wanted = self._place(asked), asked.body.get("findings")
         found = (read_results(place)["diagnosis"] or {}).get("findings", [])
-        chosen = [
-            one for one in found if [one["effect"], one["target"]] in (wanted if isinstance(wanted, list) else [])
-        ]
-        if not chosen or any(one["effect"] not in CORRECTABLE for one in chosen):
-            legal = ", ".join(f"{one['effect']} {one['target']}" for one in found if one["effect"] in CORRECTABLE)
-            raise BiodanceError(f"findings must be some that session.toml can correct: {legal or 'there is none'}.")
-        asked_of = [{key: one[key] for key in ("effect", "target", "trials", "parameters")} for one in chosen]
+        able = {f"{one['effect']} {one['target']}": one for one in found if one.get("session_entry")}
+        if not isinstance(wanted, list) or not wanted or not set(wanted) <= able.keys():
+            raise BiodanceError(f"findings must be some that session.toml can correct: {', '.join(able) or 'none is'}.")
+        keys = ("target", "trials", "parameters", "session_entry")
+        asked_of = [{key: able[name][key] for key in keys} for name in wanted]
         with self._one_export:
             return dict(
                 parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))

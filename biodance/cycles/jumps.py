@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.cycles.cut import FORCE_DOWN, Cycle
 from biodance.motion.soles import Soles
-from biodance.records import SIDES, Array, Mask, Motion, Wrench
+from biodance.records import Array, Mask, Motion, Wrench
 
 _RISES = 0.05
 """m that the centre of mass comes down again on either side of the highest point of a jump, at least."""
@@ -28,8 +28,8 @@ def jumps(
     motion: Motion,
     soles: Soles,
     centre: Array,
-    feet: Mapping[str, Wrench] | None = None,
-    known: Mask | None = None,
+    feet: Mapping[str, Wrench] | None,
+    known: Mask,
 ) -> tuple[Cycle, ...]:
     """Return the jumps of a trial; ``centre`` (T, 3) m of mass.
 
@@ -42,14 +42,13 @@ def jumps(
 
     height, time = centre[:, 2], motion.time
     sole, near = soles.outline[..., 2].min(axis=2), max(1, round(_NEAR * motion.rate))
-    total = None if feet is None else sum(feet[f"{side}_foot"].force[:, 2] for side in SIDES)
-    sure: Mask = np.zeros(time.size, dtype=bool) if known is None else np.asarray(known.all(axis=1))
     tops, _ = find_peaks(height, prominence=_RISES)
     flights = [flight for top in tops if (flight := _flight(sole, int(top), near, motion.determined)) is not None]
     found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= _SHORTEST]
-    if total is None:
+    if feet is None:
         return tuple(found)
-    return tuple(_by_force(one, time, np.asarray(total), sure) for one in found)
+    total = feet["right_foot"].force[:, 2] + feet["left_foot"].force[:, 2]
+    return tuple(_by_force(one, time, total, np.asarray(known.all(axis=1))) for one in found)
 
 
 def _flight(sole: Array, top: int, near: int, determined: Mask) -> tuple[int, int, int] | None:

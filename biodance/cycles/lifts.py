@@ -18,7 +18,9 @@ LIFT_UNITS: Mapping[str, str] = {
 }
 """Quantity of a squat, a rise or a jump -> unit."""
 _OVER = 0.1
-"""s over which the force rises that its rate is told of."""
+"""s over which the force rises that its rate is told of: one of the windows of Maffiuletti et al. 2016,
+doi:10.1007/s00421-016-3346-6.
+"""
 
 
 def lift(

@@ -35,7 +35,7 @@ from biodance.cycles.jumps import jumps
 from biodance.cycles.lifts import lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
-from biodance.lab.c3d.subject import FileOutputs
+from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
@@ -210,12 +210,12 @@ def trial_movement(
     *,
     sip: Sip | None = None,
     contact: Contact | None = None,
-    outputs: FileOutputs | None = None,
+    outputs: FileOutputs = NO_OUTPUTS,
 ) -> TrialMovement:
     """Return what moved in a prepared trial.
 
     ``sip`` what is known of the inertial parameters (by default the body's), ``contact`` with the plates (None: no
-    forces, so that only trunk and arms have moments), ``outputs`` of another program in the trial's file.
+    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file.
 
     Raises
     ------
@@ -231,19 +231,18 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    jumped = jumps(trial.name, motion, soles, centre, feet, contact.told if contact else None)
+    known_of_feet = np.zeros((motion.time.size, 2), dtype=bool) if contact is None else contact.told
+    jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
     lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*gait_cycles(trial.name, events), *lifts, *jumped)
     cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
-    sure = _fully_measured(contact, motion.time.size)
-    whole: Mask = sure if contact is None else np.asarray(contact.told.all(axis=1))
+    sure, whole = _fully_measured(contact, motion.time.size), np.asarray(known_of_feet.all(axis=1))
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
-        if outputs:
-            theirs += file_curves(cycle, outputs, motion.time, own)
-            curves += emg_curves(cycle, outputs)
+        theirs += file_curves(cycle, outputs, motion.time, own)
+        curves += emg_curves(cycle, outputs)
         if contact is not None and feet is not None:
             known = _known_loads(cycle, contact)
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
@@ -255,8 +254,8 @@ def trial_movement(
         tuple(curves),
         strides(cycles, events, body, soles, centre),
         agreement_of_events(force, markers),
-        compare_angles(body, motion, outputs) if outputs else (),
-        compare_events(events, outputs) if outputs else (),
+        compare_angles(body, motion, outputs),
+        compare_events(events, outputs),
         tuple(theirs),
         tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
         tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
@@ -293,8 +292,7 @@ def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
         return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
-    standing = [_inside(one, contact) for one in cycles if one.kind != "gait"]
-    if standing and np.any(_shared(contact) & np.any(standing, axis=0)):
+    if any(np.any(_shared(contact) & _inside(one, contact)) for one in cycles if one.kind != "gait"):
         return (
             "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
             "difference between left and right moments is not measured.",

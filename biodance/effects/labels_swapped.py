@@ -11,7 +11,7 @@ from biodance.body.body import Body
 from biodance.effects._base.exchange_spans import Pair, Spans, renamed_markers
 from biodance.effects._base.exchanged_labels import arms_hang, exchanged_labels, set_of
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import canonical
 from biodance.motion.ik.inverse_kinematics import solve_ik
@@ -48,7 +48,12 @@ class LabelsSwapped(DiscreteEffect):
         look_alikes="A marker that fell off or jumps (one of the two is right then).",
         settled_by="Exchanging the two names: only then do the distances fit.",
     )
-    words = CauseWords("{pairs} carry each other's names", f"Exchange them, {ACCEPT}", "exchanged labels")
+    words = CauseWords(
+        "{pairs} carry each other's names",
+        f"Exchange them, {ACCEPT}",
+        "exchanged labels",
+        entry=SessionEntry.EXCHANGE,
+    )
     explains = (CheckKind.PRESSURE, CheckKind.MARKERS)
 
     @classmethod

@@ -39,6 +39,12 @@ export async function showBody(all) {
     put(all.panel, frame(all.name, "body", "The body of the last run, its replay and masses"));
 }
 
+function place({ about, trial }) {
+  // where a sentence belongs: what is looked at, and the recording
+  const what = words(["", "file", "diagnosis"].includes(about) ? "" : about);
+  return [what && what[0].toUpperCase() + what.slice(1), trial].filter(Boolean).join(", ") || "Session";
+}
+
 export async function showQuality(all) {
   const { panel, name } = all,
     found = await resultsOf(all);
@@ -50,7 +56,7 @@ export async function showQuality(all) {
     h(
       "ul",
       {},
-      rows.map((one) => h("li", {}, one.trial ? h("strong", {}, `${one.trial}: `) : "", one.text)),
+      rows.map((one) => h("li", {}, h("strong", {}, `${place(one)}: `), one.text)),
     );
   put(
     panel,
@@ -67,7 +73,7 @@ export async function showQuality(all) {
       : "",
     acts.length ? [h("h2", {}, "What needs a person"), list(acts)] : "",
     notes.length
-      ? h("details", {}, h("summary", {}, `${notes.length} notes that ask nobody for anything`), list(notes))
+      ? h("details", {}, h("summary", {}, `Notes that ask nobody for anything: ${notes.length}`), list(notes))
       : "",
     h("h2", {}, "Findings"),
     found.findings.length ? findings(found.findings, all) : h("p", {}, "No cause was found."),
@@ -119,16 +125,22 @@ function judged(rows) {
   );
 }
 
+const SHOWN = { m: [1000, "mm", 0], rad: [180 / Math.PI, "°", 1], s: [1000, "ms", 1], 1: [100, "%", 1] };
+
 const size = (one) =>
+  // each parameter as people say it, ± half of its 95 % interval
   Object.entries(one.parameters || {})
-    .map(
-      ([key, value]) =>
-        `${words(key)} ${[value.value]
+    .map(([key, { value, sd, unit }]) => {
+      const [factor, called, digits] = SHOWN[unit] || [1, unit || "", 2];
+      const said = (some, scale) =>
+        [some]
           .flat()
-          .map((x) => number(x, 3))
-          .join("; ")} ${value.unit === "1" ? "" : value.unit || ""}`,
-    )
-    .join(", ");
+          .map((x) => number(x === null ? null : scale * x, digits).replace("-", "−"))
+          .join(", ");
+      const known = [sd].flat().some((x) => Number.isFinite(x));
+      return `${words(key)} ${said(value, factor)}${known ? ` ± ${said(sd, 1.96 * factor)}` : ""} ${called}`.trim();
+    })
+    .join("; ");
 
 function shownMarkers(one, { name, view }) {
   // where a finding is about labels, the way to where they are exchanged
@@ -144,7 +156,7 @@ function shownMarkers(one, { name, view }) {
 
 function findings(rows, all) {
   const place = h("div", { "aria-live": "polite" }),
-    able = rows.filter((one) => one.correctable);
+    able = rows.filter((one) => one.session_entry);
   const button = (some, text) =>
     h(
       "button",
@@ -184,7 +196,7 @@ function findings(rows, all) {
               one.advice || "",
               " ",
               shownMarkers(one, all),
-              one.correctable ? button([one], corrects(one)) : "",
+              one.session_entry ? button([one], corrects(one)) : "",
             ),
           ),
         ),
@@ -199,8 +211,8 @@ function corrects(one) {
   // what the button beside a finding does
   const [first, last] = (one.target || "").split("/"),
     where = one.trials?.length ? one.trials.join(", ") : "all recordings";
-  if (one.effect === "labels_swapped") return `Exchange ${first} and ${last} in ${where} …`;
-  if (one.effect === "plates_exchanged") return `Exchange the channels of ${first} and ${last} …`;
+  if (one.session_entry === "exchange") return `Exchange ${first} and ${last} in ${where} …`;
+  if (one.session_entry === "channels") return `Exchange the channels of ${first} and ${last} …`;
   return "Take the mass that the plates weighed …";
 }
 
@@ -208,7 +220,7 @@ async function correction(place, some, { name, edit, page }) {
   // what session.toml would say, before and after first; then it is written and the session run again
   place.replaceChildren(h("p", {}, "Working out before and after …"));
   try {
-    const told = await tell("correction", { name, findings: some.map((one) => [one.effect, one.target]) });
+    const told = await tell("correction", { name, findings: some.map((one) => `${one.effect} ${one.target}`) });
     const write = async () => {
       if (!(await edit(...told.changes))) return;
       page.run = (await tell("run", { names: [name] })).run;
@@ -219,7 +231,7 @@ async function correction(place, some, { name, edit, page }) {
       h(
         "p",
         { cls: "small" },
-        "session.toml would say ",
+        "What session.toml would say: ",
         told.changes.map(([keys, value]) => [h("code", {}, `${keys.join(".")} = ${JSON.stringify(value)}`), " "]),
         "(Undo takes it back; your recordings stay as they are).",
       ),

@@ -30,9 +30,13 @@ export async function showSession(main, page, name, tab) {
       seen = page.revision,
       apart = keys.length && !keys.some((key) => page.waiting.has(key));
     keys.forEach((key) => page.waiting.add(key));
+    page.busy += 1;
     page.queue = page.queue
       .then(() => change(path, more, apart ? page.revision : seen))
-      .finally(() => keys.forEach((key) => page.waiting.delete(key)));
+      .finally(() => {
+        page.busy -= 1;
+        keys.forEach((key) => page.waiting.delete(key));
+      });
     return page.queue;
   };
   const change = async (path, more, revision) => {
@@ -54,6 +58,7 @@ export async function showSession(main, page, name, tab) {
   const edit = (...changes) => changed("edit", { changes });
   const run = async () => {
     try {
+      await page.queue; // what was changed just now is a part of it
       page.run = (await tell("run", { names: [name] })).run;
       await page.refresh();
     } catch (error) {

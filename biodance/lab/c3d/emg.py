@@ -41,7 +41,9 @@ _HIGH_PASS = 20.0
 _LOW_PASS = 6.0
 """Hz of the envelope (Winter 2009, Biomechanics and Motor Control of Human Movement, ISBN 978-0-470-39818-0)."""
 _RECTIFIED = 0.02
-"""Share of its largest value that a channel lies below zero at most which was rectified already."""
+"""Share of its largest value within which the lowest one of a channel lies that was rectified already: raw EMG goes as
+far below zero as above, and beside an offset of the amplifier nothing comes near zero.
+"""
 _SILENT = 0.02
 """Share of the file's strongest envelope under which nothing is connected: in 30 recordings of four laboratories empty
 channels have 0.1 to 1.7 %, muscles 2.2 % and more.
@@ -103,6 +105,6 @@ def muscle_of(label: str) -> tuple[str, str] | None:
 def _envelope(value: Array, rate: float) -> Array:
     from scipy.signal import butter, sosfiltfilt
 
-    if value.min() < -_RECTIFIED * np.abs(value).max():
+    if abs(value.min()) > _RECTIFIED * np.abs(value).max():
         value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
     return np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))

@@ -42,6 +42,10 @@ class FileOutputs:
     emg: tuple[EmgEnvelope, ...] = ()
 
 
+NO_OUTPUTS = FileOutputs({}, ())
+"""Of a file that holds nothing of other programs."""
+
+
 def read_outputs(path: str | Path) -> FileOutputs:
     """Return the joint angles, foot events and muscle activity of a C3D file; empty where it holds none.
 
