@@ -172,7 +172,9 @@ def test_two_labels_are_exchanged_from_the_finding_after_before_and_after_are_se
     browser.run(f"{correct}.click()")
     browser.until("Boolean(document.querySelector('[data-key=write]'))", 120)
     assert not (archive / "S03" / "session.toml").read_text(encoding="utf-8").count("exchange")
-    rows = "[...document.querySelectorAll('.wide tbody tr')].map(one => [...one.cells].map(cell => cell.textContent))"
+    rows = (
+        "[...document.querySelectorAll('.compared tbody tr')].map(one => [...one.cells].map(cell => cell.textContent))"
+    )
     far = {when: float(cells[-1]) for trial, when, *cells in browser.run(rows) if trial == "squat_1"}
     assert far["after"] < 0.5 * far["before"]
     assert complaints(browser) == []

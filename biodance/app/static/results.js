@@ -250,34 +250,36 @@ async function correction(place, some, { name, edit, page }) {
 function residuals(rows) {
   // what plates and simulation differ by, and the markers from the body, before and after
   if (!rows.length) return "";
-  const head = ["Recording", "", ...CHANNELS, "Markers (mm)"].map((one) =>
-    h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
-  );
+  const kinds = [...CHANNELS, "Markers (mm)"];
   const line = (one, when) =>
     h(
       "tr",
       {},
       h("th", { scope: "row" }, one.trial),
-      h("td", {}, when),
-      one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
+      h("td", { "data-label": "When" }, when),
+      one[when].map((x, k) => h("td", { cls: "n", "data-label": kinds[k] }, number(x, 1))),
     );
   return h(
-    "div",
-    { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
+    "table",
+    { cls: "stack compared" },
     h(
-      "table",
+      "caption",
+      {},
+      "What plates and simulation differ by (RMS; N, N·m), and markers and body, as it is and corrected",
+    ),
+    h(
+      "thead",
       {},
       h(
-        "caption",
+        "tr",
         {},
-        "What plates and simulation differ by (RMS; N, N·m), and markers and body, as it is and corrected",
+        ["Recording", "When", ...kinds].map((one) => h("th", { scope: "col" }, one)),
       ),
-      h("thead", {}, h("tr", {}, head)),
-      h(
-        "tbody",
-        {},
-        rows.flatMap((one) => [line(one, "before"), line(one, "after")]),
-      ),
+    ),
+    h(
+      "tbody",
+      {},
+      rows.flatMap((one) => [line(one, "before"), line(one, "after")]),
     ),
   );
 }
