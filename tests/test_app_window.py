@@ -163,45 +163,6 @@ def test_a_squat_is_switched_off_and_the_next_run_leaves_it_out(browser, archive
     assert browser.until(f"{rows} === {before - 1}")
 
 
-def test_two_labels_are_exchanged_from_the_finding_after_before_and_after_are_seen(browser, archive):
-    go(browser, "#/S03/quality", "document.querySelector('h1').textContent === 'S03'")
-    browser.run("document.querySelector('[data-key=run]').click()")
-    correct = "document.querySelector('[data-key=\"correct LASI/RASI\"]')"
-    browser.until(f"Boolean({correct})", 240)
-    assert browser.run(f"{correct}.textContent") == "Exchange LASI and RASI in squat_1 …"
-    browser.run(f"{correct}.click()")
-    browser.until("Boolean(document.querySelector('[data-key=write]'))", 120)
-    assert not (archive / "S03" / "session.toml").read_text(encoding="utf-8").count("exchange")
-    rows = (
-        "[...document.querySelectorAll('.compared tbody tr')].map(one => [...one.cells].map(cell => cell.textContent))"
-    )
-    far = {when: float(cells[-1]) for trial, when, *cells in browser.run(rows) if trial == "squat_1"}
-    assert far["after"] < 0.5 * far["before"]
-    assert complaints(browser) == []
-    browser.send("Emulation.clearDeviceMetricsOverride")
-    browser.run("document.querySelector('[data-key=write]').click()")
-    browser.until("document.querySelector('#run').textContent.includes('Stop')", 60)
-    browser.until("document.querySelector('[data-key=run]')?.textContent === 'Results are up to date'", 240)
-    said = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))
-    assert said["trials"]["squat_1"]["exchange"] == [["LASI", "RASI"]]
-    assert not browser.run(f"Boolean({correct})")
-
-
-def test_two_quick_changes_are_both_written(browser, archive):
-    go(browser, "#/S03/trials", "document.querySelector('[data-key=age]')")
-    browser.run(
-        "for (const [key, value] of [['age', '41'], ['height_m', '1.71']]) { const one = document.querySelector("
-        "`[data-key=${key}]`); one.value = value; one.dispatchEvent(new Event('change')); }"
-    )
-    end = time.monotonic() + 30
-    subject: dict = {}
-    while (subject.get("age"), subject.get("height_m")) != (41, 1.71):
-        assert time.monotonic() < end, subject
-        time.sleep(0.1)
-        subject = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))["subject"]
-    assert browser.run("document.querySelector('#said').hidden")
-
-
 def events_of(archive: Path) -> list[dict]:
     return tomllib.loads((archive / "S01" / "session.toml").read_text(encoding="utf-8"))["trials"]["squat_1"].get(
         "events", []
@@ -317,6 +278,45 @@ def test_tabs_are_reached_with_the_keyboard(browser):
         "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
     )
     assert browser.until("document.activeElement.id === 'tab-gait' && document.activeElement.ariaSelected === 'true'")
+
+
+def test_two_labels_are_exchanged_from_the_finding_after_before_and_after_are_seen(browser, archive):
+    go(browser, "#/S03/quality", "document.querySelector('h1').textContent === 'S03'")
+    browser.run("document.querySelector('[data-key=run]').click()")
+    correct = "document.querySelector('[data-key=\"correct LASI/RASI\"]')"
+    browser.until(f"Boolean({correct})", 240)
+    assert browser.run(f"{correct}.textContent") == "Exchange LASI and RASI in squat_1 …"
+    browser.run(f"{correct}.click()")
+    browser.until("Boolean(document.querySelector('[data-key=write]'))", 120)
+    assert not (archive / "S03" / "session.toml").read_text(encoding="utf-8").count("exchange")
+    rows = (
+        "[...document.querySelectorAll('.compared tbody tr')].map(one => [...one.cells].map(cell => cell.textContent))"
+    )
+    far = {when: float(cells[-1]) for trial, when, *cells in browser.run(rows) if trial == "squat_1"}
+    assert far["after"] < 0.5 * far["before"]
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    browser.run("document.querySelector('[data-key=write]').click()")
+    browser.until("document.querySelector('#run').textContent.includes('Stop')", 60)
+    browser.until("document.querySelector('[data-key=run]')?.textContent === 'Results are up to date'", 240)
+    said = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))
+    assert said["trials"]["squat_1"]["exchange"] == [["LASI", "RASI"]]
+    assert not browser.run(f"Boolean({correct})")
+
+
+def test_two_quick_changes_are_both_written(browser, archive):
+    go(browser, "#/S03/trials", "document.querySelector('[data-key=age]')")
+    browser.run(
+        "for (const [key, value] of [['age', '41'], ['height_m', '1.71']]) { const one = document.querySelector("
+        "`[data-key=${key}]`); one.value = value; one.dispatchEvent(new Event('change')); }"
+    )
+    end = time.monotonic() + 30
+    subject: dict = {}
+    while (subject.get("age"), subject.get("height_m")) != (41, 1.71):
+        assert time.monotonic() < end, subject
+        time.sleep(0.1)
+        subject = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))["subject"]
+    assert browser.run("document.querySelector('#said').hidden")
 
 
 def test_nothing_is_asked_of_the_network_and_nothing_fails(browser, address):
