@@ -3,6 +3,7 @@
 import errno
 import io
 import json
+import socket
 import tomllib
 import zipfile
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from lab_sessions import two_trials, write_trial
 from starlette.testclient import TestClient
 
 from biodance.app.guard import LARGEST_BODY, POLICY
-from biodance.app.server import window_application
+from biodance.app.server import serve_window, window_application
 from biodance.app.sessions import Archive
 from biodance.errors import BiodanceError
 
@@ -327,6 +328,15 @@ def test_a_part_of_the_page_stands_alone_and_can_do_nothing_to_the_window(user, 
 def test_results_do_not_go_among_recordings(archive, tmp_path, out):
     with pytest.raises(BiodanceError, match="among the recordings"):
         Archive(archive.folder, tmp_path / out)
+
+
+def test_a_port_that_another_program_has_is_refused(archive, tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(BiodanceError, match=f"--port {port}.*Give another one, or 0 for any"):
+            serve_window(archive.folder, tmp_path / "results", port=port, opened=False)
 
 
 def test_a_folder_without_a_session_is_refused(tmp_path):

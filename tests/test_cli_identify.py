@@ -62,7 +62,7 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     )
     out = capsys.readouterr().out
     assert " ".join(out.split()).startswith(SAID)
-    assert "trunk head" in out
+    assert "trunk with head" in out
 
 
 def test_nothing_to_identify_is_one_sentence(lab, capsys):

@@ -9,6 +9,7 @@ from squatting import BODY as SQUATTER
 from squatting import squat
 
 from biodance.body.human.human import human
+from biodance.cycles.beside import compare_angles, compare_events
 from biodance.cycles.curves import (
     CycleCurve,
     angle_curves,
@@ -19,18 +20,9 @@ from biodance.cycles.curves import (
     normal_of,
     normal_toml,
 )
-from biodance.cycles.cut import (
-    Cycle,
-    agreement_of_events,
-    gait_cycles,
-    joined_events,
-    kinematic_events,
-    mean_values,
-    repetitions,
-    strides,
-    vertical_stiffness,
-)
-from biodance.cycles.movement import compare_angles, compare_events, trial_movement
+from biodance.cycles.cut import Cycle, agreement_of_events, gait_cycles, joined_events, kinematic_events, repetitions
+from biodance.cycles.movement import trial_movement
+from biodance.cycles.strides import mean_values, strides, vertical_stiffness
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass, poses

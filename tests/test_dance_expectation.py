@@ -106,7 +106,7 @@ def test_what_came_of_an_emphasis_is_said_and_why_it_is_no_more() -> None:
     plan = replace(PLAN, weights=(("left_forearm_hand", 1.0),), other_weight=0.0)
     result = DanceResult(BODY, plan, None, (), None, expected(0.5, 0.010), "", (), 1.0)
     (said,) = result.emphasis
-    assert "Emphasis on the left forearm hand: its mass becomes known to 0.50 kg (table: 1.00)" in said
+    assert "Emphasis on the left forearm with hand: its mass becomes known to 0.50 kg (table: 1.00)" in said
     assert "sides are alike (correlation in the table 0.80)" in said
     assert replace(result, plan=PLAN).emphasis == ()
     told = result.expectation

@@ -140,7 +140,7 @@ def test_the_report_holds_identification_where_there_is_one(roles, monkeypatch):
 def test_a_load_on_the_page_has_segment_size_and_interval():
     text = identification_section(session_result(load=2.4, seed=5).identification)
     assert "Beyond the table the subject carries 2." in text
-    assert "kg on the left forearm hand (95 % interval" in text
+    assert "kg on the left forearm with hand (95 % interval" in text
 
 
 def test_joint_torques_of_the_kept_trial_are_told_with_their_band():

@@ -86,7 +86,7 @@ def test_a_load_is_drawn_where_it_sits(result):
     np.testing.assert_allclose(still.load, pose.points([segment], place[None])[0, 0], atol=1e-12)
     low, high = best.interval
     assert still.about == (
-        "The load that was found (yellow): 2.00 kg on the left forearm hand "
+        "The load that was found (yellow): 2.00 kg on the left forearm with hand "
         f"(95 % interval {low:.2f} to {high:.2f} kg; probability of no load below 0.001)."
     )
     unplaced = replace(best, place=np.full(3, np.nan))

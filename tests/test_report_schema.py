@@ -63,7 +63,7 @@ def test_several_are_rows_in_order_and_say_what_they_are_about():
 
 def test_page_terminal_and_markdown_show_the_same_cells():
     row = ROW.row(BAG)
-    cells = ["left forearm hand", "2.4", "2.00 kg", "–", "3, 2"]
+    cells = ["left forearm with hand", "2.4", "2.00 kg", "–", "3, 2"]
     assert ROW.cells(row) == cells
     assert markdown_table(ROW, [row]).splitlines()[2] == f"| {' | '.join(cells)} |"
     page = html_table(ROW, [row | {"segment": "<b>"}], "a < b", only=("segment", "mass (kg)"))

@@ -41,7 +41,7 @@ EXPORTS: Mapping[str, str] = {
 """Formats that are offered, and the ending of their file; "" = a folder, handed out as .zip."""
 _OF_TRIALS = ("c3d", "trc", "mot")
 _SHOWN = ("attention", "judged", "checks", "subject", "mass_check", "refused", "steps")
-_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice")
+_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice", "session_entry")
 
 
 def read_results(place: SessionPlace) -> dict[str, Any]:

@@ -66,6 +66,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         window.redo,
         window.run,
         window.stop,
+        window.correction,
         window.accept,
         window.keep,
         window.open,

@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from biodance.cycles.cut import STRIDE_UNITS, gait_cycles, is_left_out, mean_values, replaced_events, strides
+from biodance.cycles.cut import gait_cycles, is_left_out, replaced_events
+from biodance.cycles.strides import STRIDE_UNITS, mean_values, strides
 from biodance.errors import BiodanceError
 from biodance.lab.session.file import read_session_file
 from biodance.library import parse_json

@@ -1,5 +1,6 @@
 """What the pages of a window ask for, each question a method; how they are asked is `server`'s."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,6 +162,20 @@ class Window:
             if kind == "csv":
                 return _attached(f"{stem}_tables.zip", csv_archive(place))
             return _attached(*exported(place, kind, asked.text("trial")))
+
+    def correction(self, asked: Asked) -> dict[str, Any]:
+        """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
+        place, wanted = self._place(asked), asked.body.get("findings")
+        found = (read_results(place)["diagnosis"] or {}).get("findings", [])
+        able = {f"{one['effect']} {one['target']}": one for one in found if one.get("session_entry")}
+        if not isinstance(wanted, list) or not wanted or not set(wanted) <= able.keys():
+            raise BiodanceError(f"findings must be some that session.toml can correct: {', '.join(able) or 'none is'}.")
+        keys = ("target", "trials", "parameters", "session_entry")
+        asked_of = [{key: able[name][key] for key in keys} for name in wanted]
+        with self._one_export:
+            return dict(
+                parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))
+            )
 
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""

@@ -308,14 +308,14 @@ ROW_TYPES: dict[str, str] = {
     "frames": "Int64",
     **dict.fromkeys(("rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m"), "float64"),
     **dict.fromkeys(("fz_rms_table_n", "fz_rms_identified_n"), "float64"),
-    **dict.fromkeys(("gait_cycles", "squats", "rises", "foot_events"), "Int64"),
+    **dict.fromkeys(("gait_cycles", "squats", "rises", "jumps", "foot_events"), "Int64"),
     "speed_m_per_s": "float64",
     **dict.fromkeys((f"{angle}_max_deg" for angle in _ANGLES), "float64"),
     "warnings": "Int64",
     **dict.fromkeys(("seconds", "memory_mb"), "float64"),
 }
 """Every column of summary.parquet and summary.csv, and its type."""
-_KINDS = {"gait": "gait_cycles", "squat": "squats", "sit_to_stand": "rises"}
+_KINDS = {"gait": "gait_cycles", "squat": "squats", "sit_to_stand": "rises", "jump": "jumps"}
 _OF_TRIAL = ("role", "status", "reason", "frames", "rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m")
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.cut import PERCENT, Cycle, place_at
+from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
 from biodance.motion.soles import Soles

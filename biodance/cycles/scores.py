@@ -132,11 +132,6 @@ def gait_vectors(curves: Sequence[CycleCurve]) -> dict[Cycle, Array]:
     return {cycle: np.concatenate([angles[name] for name in SCORE_ANGLES]) for cycle, angles in whole.items()}
 
 
-def _gait_bands(normal: Sequence[NormalCurve]) -> dict[str, NormalCurve]:
-    """Return the reference's angles in gait by their names."""
-    return {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
-
-
 def gait_scores(
     curves: Sequence[CycleCurve], normal: Sequence[NormalCurve], deviation: DeviationReference | None = None
 ) -> GaitScores | None:
@@ -167,6 +162,11 @@ def gait_scores(
     gdi = _known_spreads({side: [value for cycle, value in index.items() if cycle.side == side] for side in seen})
     people = min(bands[name].people for name in SCORE_ANGLES)
     return GaitScores(variables, gps, _overall(seen), gdi, people)
+
+
+def _gait_bands(normal: Sequence[NormalCurve]) -> dict[str, NormalCurve]:
+    """Return the reference's angles in gait by their names."""
+    return {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
 
 
 def _known_spreads(values: Mapping[_Key, Iterable[float]]) -> dict[_Key, Spread]:

@@ -20,7 +20,7 @@ from biodance.effects._base.named_cause import NamedCause
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.transient import Transient
-from biodance.effects._base.words import About, CauseWords, CheckKind
+from biodance.effects._base.words import About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import UnknownName
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
@@ -40,6 +40,7 @@ __all__ = [
     "QualityCheck",
     "Quantity",
     "Recorded",
+    "SessionEntry",
     "Transient",
     "causes",
     "check_quality",

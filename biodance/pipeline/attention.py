@@ -289,7 +289,7 @@ def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
             "warn" if one.advice else "note",
             f"{'left open when' if one.cause.of_person() else 'taken off before'} the body was fitted, in "
             f"{listed(one.trials) or 'all trials'}: {spoken(one).fact}. "
-            f"{one.advice}".strip(),
+            f"{one.cause.advice if one.advice else ''}".strip(),
             about=one.effect,
         )
         for one in found

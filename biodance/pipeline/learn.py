@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance import display
+from biodance.cycles.beside import EMG
 from biodance.cycles.curves import CurveGroup, NormalCurve, normal_curves
 from biodance.cycles.scores import FEATURES, DeviationReference, deviation_reference, gait_vectors
 from biodance.diagnosis.archive.norms import (
@@ -67,9 +68,10 @@ class HealthyReference:
 
 
 def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
-    """Return how the person of an examined ``session`` moved."""
+    """Return how the person of an examined ``session`` moved; without EMG, whose size hangs on skin and electrodes."""
     moved = session_movement(result)
-    curves = tuple(group for one in moved.repetitions.values() for group in one.groups)
+    groups = (group for one in moved.repetitions.values() for group in one.groups)
+    curves = tuple(group for group in groups if not group.quantity.endswith(EMG))
     found = gait_vectors(moved.gait.curves) if moved.gait else {}
     by_side = {side: [vector for cycle, vector in found.items() if cycle.side == side] for side in SIDES}
     vectors = {side: np.stack(rows) for side, rows in by_side.items() if rows}

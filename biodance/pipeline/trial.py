@@ -13,7 +13,7 @@ from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point
-from biodance.lab.c3d.subject import FileOutputs, read_outputs
+from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs, read_outputs
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.prepare import prepare
@@ -241,11 +241,11 @@ def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
         return None
 
 
-def _outputs(trial: Trial) -> FileOutputs | None:
-    """Return what another program wrote into the trial's file; None where it is no C3D file or cannot be read again."""
+def _outputs(trial: Trial) -> FileOutputs:
+    """Return what else the trial's file holds; nothing where it is no C3D file or cannot be read again."""
     if trial.source.format != "C3D":
-        return None
+        return NO_OUTPUTS
     try:
         return read_outputs(trial.source.path)
     except BiodanceError:
-        return None
+        return NO_OUTPUTS

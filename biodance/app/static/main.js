@@ -5,6 +5,7 @@ import { showSession } from "./session.js";
 
 const main = document.getElementById("main");
 const page = { turn: 0, name: "", revision: "", refresh: null, run: null };
+Object.assign(page, { queue: Promise.resolve(), busy: 0, waiting: new Set() }); // changes that are not answered yet
 
 export function address(name, tab = "trials") {
   return name ? `#/${encodeURIComponent(name)}/${tab}` : "#/";
@@ -60,12 +61,15 @@ function showRun(run) {
 async function look() {
   // every two seconds, sooner while something runs
   try {
-    const found = await ask("state", page.name ? { name: page.name } : {});
+    const mine = page.busy, // what a change of ours does is no other's doing
+      about = page.name,
+      found = await ask("state", about ? { name: about } : {});
     const before = page.run;
     page.run = found.run;
     showRun(found.run);
     if (found.run?.state === "failed" && before?.state === "running") say(found.run.why);
-    if (page.name && page.revision && found.revision !== page.revision) {
+    const idle = !mine && !page.busy && about === page.name;
+    if (idle && page.name && page.revision && found.revision !== page.revision) {
       say("session.toml was changed elsewhere, in another tab or an editor. It is shown as it is now.");
       page.revision = found.revision;
       await page.refresh?.();

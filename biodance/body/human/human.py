@@ -50,6 +50,7 @@ from biodance.body.tables.anthropometry import Reference, error_size, proportion
 from biodance.body.tables.choice import PARTS, measured_whole, reference, regression, studies, study_masses, trunk_joint
 from biodance.body.tables.choice import lengths as reference_lengths
 from biodance.body.tables.choice import reference as reference_of
+from biodance.display import spaced
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
@@ -434,7 +435,7 @@ def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
         by_source.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
     some = [f"{names} for {' and '.join(segments)}" for names, segments in by_source.items() if names]
     scanned = ["the scan for all segments"] if "scan" in told.get("pelvis", ()) else []
-    words = "; ".join([*some, *scanned]).replace("_", " ")
+    words = spaced("; ".join([*some, *scanned]))
     return (
         f"Shapes of the person weigh beside the table in the prior ({words}): girths as stadium solids (Yeadon 1990) "
         "and foot outlines about the mean of all tables, a scan by volume and density; other segments keep the table's "

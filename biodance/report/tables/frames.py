@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.cycles.cut import PERCENT, STRIDE_UNITS
+from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.strides import STRIDE_UNITS
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import SessionIdentification

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from biodance.cycles.curves import CurveGroup
-from biodance.cycles.cut import PERCENT, STRIDE_UNITS
+from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.strides import STRIDE_UNITS
 from biodance.lab.prepare import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult

@@ -1,0 +1,163 @@
+"""The spatio-temporal values of walking and running: cadence, speed, lengths and times of steps, contact and flight,
+margin of stability, vertical stiffness.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.cycles.cut import Cycle, heel_and_toe
+from biodance.motion.soles import Soles
+from biodance.records import SIDES, Array, FootEvent
+from biodance.settings import STANDARD_GRAVITY
+
+_BELT = 0.15  # m/s of a standing foot from which the ground is a belt
+_FLAT = (10.0, 25.0)
+"""% of a cycle in which the foot stands flat, of runners too, and tells how fast the ground moves: after the loading
+response (to 12 %) and before the heel leaves (31 %; Perry and Burnfield 2010, ISBN 978-1-55642-766-4).
+"""
+STRIDE_UNITS: Mapping[str, str] = {
+    "cadence": "steps/min",
+    "speed": "m/s",
+    "stride_length": "m",
+    "stride_time": "s",
+    "step_length": "m",
+    "step_time": "s",
+    "step_width": "m",
+    "stance": "%",
+    "double_support": "%",
+    "margin_aside": "m",
+    "margin_ahead": "m",
+    "contact_time": "s",
+    "flight_time": "s",
+    "vertical_stiffness": "kN/m",
+}
+"""Spatio-temporal quantity -> unit."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that is not known is missing."""
+
+    cycle: Cycle
+    values: Mapping[str, float]
+
+
+def strides(
+    cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, soles: Soles, centre: Array
+) -> tuple[Stride, ...]:
+    """Return the values of all gait cycles; ``centre`` (T, 3) m of mass at the times of the soles.
+
+    Lengths are horizontal: a stride from a heel's place at one strike to its next, relative to the ground, which on a
+    treadmill is as fast as the foot that stands on it. A step goes from the other foot's strike to this foot's, its
+    length along the stride, its width across it, negative where the feet cross. Margins: `_margins`. Flight, from
+    leaving the ground to the other foot's strike, and stiffness (`vertical_stiffness`) are of running.
+    """
+    heel, mass, found = heel_and_toe(body, soles.outline)[0][..., :2], float(body.sip.mass.sum()), []
+    for one in (one for one in cycles if one.kind == "gait"):
+        other_off, other_strike = _other_foot(one, events)
+        values = _values(one, other_off, other_strike, heel, soles.time)
+        values |= _margins(one, other_off, other_strike, heel, soles, centre)
+        contact, flight = one.off - one.start, other_strike - one.off
+        if flight > 0:
+            stiffness = 1e-3 * vertical_stiffness(mass, contact, flight)
+            values |= {"contact_time": contact, "flight_time": flight, "vertical_stiffness": stiffness}
+        found.append(Stride(one, values))
+    return tuple(found)
+
+
+def vertical_stiffness(mass: float, contact: float, flight: float) -> float:
+    """Return the stiffness, N/m, of the spring on which a runner of ``mass`` kg bounces who is on the ground for
+    ``contact`` s and in the air for ``flight`` s: a half sine of force, over the way that the body goes down in it
+    (Morin et al. 2005, doi:10.1123/jab.21.2.167).
+    """
+    largest = mass * STANDARD_GRAVITY * np.pi / 2 * (flight / contact + 1)
+    down = largest * contact**2 / (mass * np.pi**2) - STANDARD_GRAVITY * contact**2 / 8
+    return float(largest / down)
+
+
+def _margins(
+    cycle: Cycle, other_off: float, other_strike: float, heel: Array, soles: Soles, centre: Array
+) -> dict[str, float]:
+    """Return by how much the sole reaches beyond the extrapolated centre of mass, m (Hof et al. 2005,
+    doi:10.1016/j.jbiomech.2004.03.025): ``margin_aside`` outwards, the least of single support; ``margin_ahead`` along
+    the stride, at the strike.
+
+    The extrapolated centre is where centre + velocity / root(g / l) lies over the ground, with l the mean distance of
+    the centre of mass from the heel while the foot stands; velocity is relative to the ground.
+    """
+    foot, time = SIDES.index(cycle.side), soles.time
+    ground = _ground(cycle, heel[:, foot], time)
+    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
+    stride, stands = end - start - ground * cycle.duration, (time >= cycle.start) & (time <= cycle.off)
+    if not stands.any() or not np.linalg.norm(stride) > 0:
+        return {}
+    along = stride / np.linalg.norm(stride)
+    outwards = np.array([along[1], -along[0]]) * (1.0 if cycle.side == "right" else -1.0)
+    from_heel = centre[stands] - np.column_stack([heel[stands, foot], soles.outline[stands, foot, :, 2].min(axis=1)])
+    pendulum = np.sqrt(np.linalg.norm(from_heel, axis=1).mean() / STANDARD_GRAVITY)
+    beyond = centre[:, :2] + pendulum * (np.gradient(centre[:, :2], time, axis=0) - ground)
+    aside, ahead = ((soles.outline[:, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
+    margins = {"margin_ahead": float(np.interp(cycle.start, time, ahead))}
+    single = (time >= other_off) & (time <= other_strike)
+    return margins | ({"margin_aside": float(aside[single].min())} if single.any() else {})
+
+
+def mean_values(
+    strides: Sequence[Stride], side: str = "both", *, units: Mapping[str, str] = STRIDE_UNITS
+) -> dict[str, tuple[float, float, int]]:
+    """Return mean, standard deviation (NaN for one stride) and number of every value of ``units`` that they have."""
+    out = {}
+    for name in units:
+        some = [s.values[name] for s in strides if name in s.values and side in ("both", s.cycle.side)]
+        if some:
+            out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))
+    return out
+
+
+def _other_foot(cycle: Cycle, events: Sequence[FootEvent]) -> tuple[float, float]:
+    """Return when, s, the other foot leaves and strikes the ground in a cycle; NaN = not known."""
+    inside = [one for one in events if one.side != cycle.side and cycle.start < one.time < cycle.end]
+    strikes, offs = ([one.time for one in inside if one.down is down] for down in (True, False))
+    strike = strikes[0] if len(strikes) == 1 else np.nan
+    before = [time for time in offs if time < strike]
+    return before[0] if len(before) == 1 else np.nan, strike
+
+
+def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array) -> dict[str, float]:
+    foot = SIDES.index(cycle.side)
+    ground = _ground(cycle, heel[:, foot], time)
+    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
+    stride = end - start - ground * cycle.duration
+    length = float(np.linalg.norm(stride))
+    values = {
+        "cadence": 120.0 / cycle.duration,
+        "speed": length / cycle.duration,
+        "stride_length": length,
+        "stride_time": cycle.duration,
+    }
+    if np.isfinite(cycle.off):
+        values["stance"] = cycle.off_percent
+    if np.isfinite(other_strike) and length > 0:
+        across = end - place_at(heel[:, 1 - foot], time, other_strike) - ground * (cycle.end - other_strike)
+        along = stride / length
+        values["step_time"] = cycle.end - other_strike
+        values["step_length"] = float(across @ along)
+        to_right = float(across[0] * along[1] - across[1] * along[0])
+        values["step_width"] = to_right if cycle.side == "right" else -to_right
+    double = other_off - cycle.start + max(0.0, cycle.off - other_strike)
+    return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
+
+
+def _ground(cycle: Cycle, heel: Array, time: Array) -> Array:
+    """Return the velocity (2,) m/s of what the foot stands on; zero for a floor."""
+    first, last = (cycle.start + share / 100 * cycle.duration for share in _FLAT)
+    velocity = (place_at(heel, time, last) - place_at(heel, time, first)) / (last - first)
+    return velocity if np.linalg.norm(velocity) > _BELT else np.zeros(2)
+
+
+def place_at(path: Array, time: Array, when: float) -> Array:
+    """Return the place (k,) at an instant s of a path (T, k)."""
+    return np.array([np.interp(when, time, column) for column in path.T])
