@@ -277,10 +277,18 @@ def _marker_leg(place: Mapping[str, Array], side: str) -> float:
     return float(np.linalg.norm(asis - knee) + np.linalg.norm(knee - ankle))
 
 
+def _bent(place: Mapping[str, Array], side: str) -> bool:
+    """Return whether somebody sits: from the pelvis to the knee a leg goes ahead farther than down."""
+    asis, knee = (place[f"{side}_{name}"] for name in ("asis", "knee_lateral"))
+    return bool(np.hypot(*(knee - asis)[:2]) > asis[2] - knee[2])
+
+
 def _contradictions(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> list[str]:
     """Return a warning for every typed measure that the markers contradict."""
     checks = [("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)]
     for side, letter in _LETTER.items():
+        if _bent(place, side):
+            continue
         checks.append(
             (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), _marker_leg(place, side), _LEG_BETWEEN)
         )
