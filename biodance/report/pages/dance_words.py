@@ -3,7 +3,7 @@ stands here whole, so that every part is in the catalogue.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from biodance.dance.cues import Say
 from biodance.dance.search.known_postures import IN_PART, posture_phrases
@@ -60,6 +60,6 @@ def posture_said(name: str, say: Say) -> str:
     return ", ".join(said)
 
 
-def script_words(scripts: Iterable[str], say: Say) -> dict[str, str]:
-    """Return what ``scripts`` say, and the names in their data, each beside how one may ``say`` it."""
-    return {text: say(text) for script in scripts for text in (*_SAID.findall(script), *SHOWN)}
+def script_words(scripts: Iterable[str], translated: Callable[[str], str]) -> dict[str, str]:
+    """Return what ``scripts`` say, and the names in their data, each beside its translation, places left open."""
+    return {text: translated(text) for script in scripts for text in (*_SAID.findall(script), *SHOWN)}

@@ -272,7 +272,7 @@ def feedback_page(
     words = words or read_language()
     visit, following = template_text("visit.js"), template_text("follow_body.js") + template_text("follow.js")
     program = template_text("feedback.js")
-    said = {} if words.tag == ENGLISH else script_words((program, visit, following), words.say)
+    said = {} if words.tag == ENGLISH else script_words((program, visit, following), words.catalogue.gettext)
 
     return render(
         "feedback.html.j2",
