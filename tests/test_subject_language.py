@@ -137,3 +137,9 @@ def test_a_catalogue_of_ones_own_is_taken_or_refused_with_what_is_wrong(tmp_path
     with pytest.raises(FileRefused, match=said) as refused:
         read_language(own)
     assert str(refused.value).count("ours.po") == 1
+
+
+def test_a_catalogue_that_loses_a_limb_is_refused(tmp_path):
+    (tmp_path / "fr.po").write_text(bracketed().replace("⟦lift {} forward⟧", "⟦lift forward⟧"), encoding="utf-8")
+    with pytest.raises(FileRefused, match=r"is to hold \{\}"):
+        read_language(tmp_path / "fr.po")
