@@ -238,8 +238,10 @@ by("speak").closest("label").hidden = !voices;
 voices?.getVoices(); // asked early: a browser fills its list later
 function speak(text) {
   if (!voices || !by("speak").checked || !playing) return;
-  const voice = voices.getVoices().find((one) => one.localService && one.lang.startsWith(document.documentElement.lang.slice(0, 2)));
-  if (!voice) return void (by("said").textContent = say("This browser has no voice of its own for this language: nothing is spoken."));
+  const tongue = document.documentElement.lang.slice(0, 2);
+  const voice = voices.getVoices().find((one) => one.localService && one.lang.startsWith(tongue));
+  if (!voice) return void (by("said").textContent =
+    say("This browser has no voice of its own for this language: nothing is spoken."));
   const said = new SpeechSynthesisUtterance(text.replaceAll("°", " " + say("degrees")));
   said.voice = voice;
   voices.cancel();

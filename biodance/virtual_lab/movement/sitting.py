@@ -11,7 +11,7 @@ from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.posing import Curves, FootStance, Pose, Z, turn_about
 from biodance.virtual_lab.person.person import Person
 
-FLESH = 0.08
+_FLESH = 0.08
 """m from the seat up to the hip centres: half a thigh."""
 LEGS_APART, AHEAD = 0.4, 0.05
 """m between the legs of the stool, and from the hips forward to its middle."""
@@ -41,8 +41,8 @@ def sit(person: Person, pose: Pose, curves: Curves, place: FootStance, hips: flo
     about the point under them on which it sits, and the legs do as the ``curves`` say, as far as the seat lets them.
     """
     legs = [Leg.of(person.body, side) for side in SIDES]
-    under = np.mean([leg.hip for leg in legs], axis=0) - np.array([0.0, FLESH, 0.0])
-    seat = np.array([*place.ankle["right"][:2], hips - FLESH])
+    under = np.mean([leg.hip for leg in legs], axis=0) - np.array([0.0, _FLESH, 0.0])
+    seat = np.array([*place.ankle["right"][:2], hips - _FLESH])
     q = pose.q.copy()
     q[:, :3] = seat - pose.pelvis_turn @ under
     for side, leg in zip(SIDES, legs, strict=True):
