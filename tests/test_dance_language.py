@@ -68,8 +68,7 @@ def test_the_page_leads_in_german_and_colours_the_sides(tmp_path: Path) -> None:
         assert scene["cues"][0]["stance"] == "mit beiden Füßen nebeneinander"
         assert browser.run("by('now').textContent") in ("Drücken Sie Start", "Machen Sie sich bereit")
         browser.key(" ")
-        browser.until("document.body.dataset.phase === 'move'", 60)
-        assert browser.run("by('now').textContent") == "Jetzt bewegen"
-        assert browser.run("document.querySelector('#calls .left').textContent") == "linken"
-        assert browser.run("by('play').textContent") == "Pause"
+        seen = "[by('now').textContent, document.querySelector('#calls .left')?.textContent, by('play').textContent]"
+        found = browser.until(f"document.body.dataset.phase === 'move' && {seen}", 60)
+        assert found == ["Jetzt bewegen", "linken", "Pause"]
         assert browser.run("say('%(number)s of %(count)s', { number: 1, count: 2 })") == "1 von 2"
