@@ -50,7 +50,7 @@ function several(legend, key, choices, values, changed) {
 
 function rows(caption, columns, made) {
   const head = columns.map((text) => h("th", { scope: "col" }, text));
-  return h("table", {}, h("caption", {}, caption), h("thead", {}, h("tr", {}, head)), h("tbody", {}, made));
+  return h("table", { cls: "stack" }, h("caption", {}, caption), h("thead", {}, h("tr", {}, head)), h("tbody", {}, made));
 }
 
 function sidedRow(one, cell) {
