@@ -17,6 +17,7 @@ from biodance.app.guard import LARGEST_BODY, POLICY
 from biodance.app.server import serve_window, window_application
 from biodance.app.sessions import Archive
 from biodance.errors import BiodanceError
+from biodance.library import names
 
 PORT, TOKEN = 8123, "a-token"
 HOME = f"http://127.0.0.1:{PORT}"
@@ -448,3 +449,14 @@ def test_the_corrected_copies_among_the_results_are_opened_as_a_session(user, ar
     write_trial(copies, "static")
     assert [row["name"] for row in post(user, "open", folder=str(copies))["rows"]] == ["corrected"]
     assert [one["stem"] for one in viewed(user, "corrected")["trials"]] == ["static"]
+
+
+def test_the_form_is_asked_and_the_file_saved_through_the_server(user) -> None:
+    assert set(user.get("/api/form").json()["templates"]) == {"nobody", *names("protocols/limits")}
+    values = json.dumps({"seat_height_m": 0.5})
+    found = user.get("/download", params={"format": "limits", "template": "nobody", "values": values})
+    assert found.headers["content-disposition"] == 'attachment; filename="person.toml"'
+    assert tomllib.loads(found.text) == {"seat_height_m": 0.5}
+    for wrong in ("[]", "{", json.dumps({"seat_height_m": "high"})):
+        answer = user.get("/download", params={"format": "limits", "template": "nobody", "values": wrong})
+        assert answer.status_code == 400, wrong

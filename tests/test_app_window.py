@@ -243,6 +243,33 @@ def test_nobody_is_shut_out_of_a_tab(browser, tab):
     browser.send("Emulation.clearDeviceMetricsOverride")
 
 
+def test_a_person_s_limits_are_filled_in_and_saved(browser, tmp_path):
+    go(browser, "#limits", "document.querySelector('[data-key=template]')")
+    choose(browser, "[data-key=template]", "stroke")
+    browser.until("document.querySelector('[data-key=reason]').value === 'stroke, left side'")
+    choose(browser, '[data-key="deg left_arm_forward"]', "65")
+    choose(browser, '[data-key="strength left_arm"]', "grade 4")
+    browser.run("document.querySelector('[data-key=\"hold_frame right\"]').click()")
+    browser.until("document.querySelector('[data-key=file]').textContent.includes('\\nhold_frame = [\"right\"]')")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    choose(browser, "[data-key=seat_height_m]", "6")
+    browser.until("document.querySelector('#said').textContent.includes('between 0.3 and 1.2')")
+    assert not browser.run("document.querySelector('main a.button')")
+    choose(browser, "[data-key=seat_height_m]", "0.6")
+    browser.until("Boolean(document.querySelector('main a.button'))")
+    browser.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    press(browser, "Save person.toml")
+    end = time.monotonic() + 60
+    while not (tmp_path / "person.toml").exists():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    saved = tomllib.loads((tmp_path / "person.toml").read_text(encoding="utf-8"))
+    assert saved["at_most_deg"]["left arm forward"] == 65
+    assert saved["strength"] == {"left_arm": "grade 4", "left_leg": 0.7}
+    assert (saved["hold_frame"], saved["seat_height_m"]) == (["right"], 0.6)
+
+
 def test_another_folder_is_chosen_in_the_window(browser, archive):
     go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
     chooser = "document.querySelector('[data-key=folder]')"

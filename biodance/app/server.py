@@ -58,6 +58,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         window.results,
         window.strides,
         window.folders,
+        window.form,
     )
     writes = (
         window.edit,
@@ -70,6 +71,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         window.accept,
         window.keep,
         window.open,
+        window.limits,
     )
     routes = [
         Route("/", static),

@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
 from biodance.app.folders import allowed_folder, folders_document
+from biodance.app.limits import limits_form, limits_text
 from biodance.app.outputs import (
     csv_archive,
     exported,
@@ -150,7 +151,9 @@ class Window:
         return Response(text, media_type="text/html", headers={"Content-Security-Policy": _SANDBOX})
 
     def download(self, asked: Asked) -> Response:
-        """Return the results in a format: a file of theirs, all tables, or for another program."""
+        """Return the results in a format: a file, all tables, for another program; or a person's limits."""
+        if asked.text("format") == "limits":
+            return _attached("person.toml", self.limits(asked)["text"].encode())
         place, kind = self._place(asked), asked.text("format")
         stem = place.folder.resolve().name
         if kind == "file":
@@ -176,6 +179,17 @@ class Window:
             return dict(
                 parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))
             )
+
+    def form(self, _: Asked) -> dict[str, Any]:
+        """Return what the form for a person's limits asks."""
+        return limits_form()
+
+    def limits(self, asked: Asked) -> dict[str, str]:
+        """Return the file of what was filled into the form for a person's limits."""
+        values = parse_json(asked.text("values"))
+        if not isinstance(values, dict):
+            raise BiodanceError(f"values = {values!r} is no JSON object.")
+        return {"text": limits_text(asked.text("template"), values)}
 
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""

@@ -101,8 +101,8 @@ def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
 
 
 def reference_angles(person: Person) -> Array:
-    """Return the true joint angles (39,) rad in which the markers were glued: upright, arms slightly away."""
-    angles = dict(person.habits.angles)
+    """Return the true joint angles (39,) rad in which the markers were glued: upright, arms slightly away, or bent."""
+    angles = dict(person.habits.angles) | dict(person.bent)
     for side in SIDES:
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
         angles |= {f"{side}_shoulder_flexion": flexion, f"{side}_shoulder_adduction": adduction}

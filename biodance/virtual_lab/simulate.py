@@ -6,9 +6,10 @@ OUT/truth/truth.json                   what only the simulation knows; no other 
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -76,9 +77,10 @@ def write_visit(
     seed: int,
     loads: tuple[AddedLoad, ...] = (),
     visit: LabVisit = FIRST_VISIT,
+    bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its
-    folder.
+    folder; markers were glued on somebody with joints ``bent`` by so many rad.
 
     Raises
     ------
@@ -99,7 +101,7 @@ def write_visit(
         joint_shifts=visit.joint_shifts,
         population=visit.laboratory.population,
     )
-    person = with_prostheses(person, visit.lighter_limbs)
+    person = replace(with_prostheses(person, visit.lighter_limbs), bent=bent)
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
     with whole_folder(out) as part:
         _write(plan, person, instruments, visit, performed, part)

@@ -1,6 +1,7 @@
 // The window: which page is shown (the address behind #), what runs, and whether another tab changed something.
 import { showArchive } from "./archive.js";
 import { ask, h, say, tell } from "./dom.js";
+import { showLimits } from "./limits.js";
 import { showSession } from "./session.js";
 
 const main = document.getElementById("main");
@@ -15,7 +16,8 @@ async function show() {
   page.turn += 1;
   const [, name, tab] = location.hash.split("/").map(decodeURIComponent);
   try {
-    if (name) await showSession(main, page, name, tab || "trials");
+    if (location.hash === "#limits") await showLimits(main, page);
+    else if (name) await showSession(main, page, name, tab || "trials");
     else await showArchive(main, page);
   } catch (error) {
     main.replaceChildren(h("p", {}, error.message), h("p", {}, h("a", { href: "#/" }, "All sessions")));

@@ -1,9 +1,9 @@
 """Perform a trial: the true motion and the true ground wrench of a virtual person, by pinocchio's own dynamics.
 
 The path of the pelvis is what keeps the balance: the zero-moment point of the full body is brought to where the posture
-asks for it. Whoever copies a planned dance from a screen is late, slower, degrees off in every joint, but on both feet:
-the plan is a motion of the 12-segment model, the person's own bones, habits and soft parts differ, so the copy is made
-joint by joint, and the path of the pelvis keeps the zero-moment point where the plan has it.
+asks for it. Whoever copies a planned dance from a screen is late, slower, degrees off in every joint, but on both feet
+or on a stool: the plan is a motion of the 12-segment model, the person's own bones, habits and soft parts differ, so
+the copy is made joint by joint, and the path of the pelvis keeps the zero-moment point where the plan has it.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from biodance.body.body import Body, load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array, Motion, Wrench, freeze
+from biodance.records import SIDES, Array, Motion, Role, Wrench, freeze
 from biodance.virtual_lab.movement.posing import (
     COLUMNS,
     RAISED,
@@ -41,6 +41,7 @@ from biodance.virtual_lab.movement.posing import (
     upper_body,
 )
 from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.movement.sitting import LEGS_APART, sit, take_seat
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, smooth_noise, stream
 
@@ -318,7 +319,8 @@ class Shown:
     """One stretch of a dance as it is shown, both feet staying where they are.
 
     ``motion`` of ``body``, resting at both ends; ``ankle`` (2, 3) m right and left; ``raised`` (T, 2) 0 = planted .. 1
-    = free, right and left; ``pressure`` (T, 2) m zero-moment point.
+    = free, right and left; ``pressure`` (T, 2) m zero-moment point; ``seat`` m height of the hip centres of a person on
+    a stool, 0 standing; ``role`` of the trial.
     """
 
     name: str
@@ -327,6 +329,8 @@ class Shown:
     ankle: Array
     raised: Array
     pressure: Array
+    seat: float = 0.0
+    role: Role = "fit"
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
@@ -334,7 +338,7 @@ class Shown:
 
     def plan(self, seconds: float) -> TrialPlan:
         """Return the trial of a performance that takes ``seconds``."""
-        return TrialPlan(self.name, "fit", "parallel", (), seconds / 2)
+        return TrialPlan(self.name, self.role, "parallel", (), seconds / 2)
 
 
 def copy_dance(
@@ -362,6 +366,12 @@ def copy_dance(
     for field in _JOINTS:
         values[:, COLUMNS[field]] += error[:, COLUMNS[field]]
     values[:, COLUMNS["pelvis"]] += PELVIS * error[:, COLUMNS["pelvis"]]
+    if shown.seat:
+        stance = take_seat(centre, heading, rng)
+        values[:, SHIFT] = np.clip(0.5 - pressure[:, 1] / LEGS_APART, 0.0, 1.0)
+        curves = Curves(time, values)
+        nodes = sit(person, upper_body(person, curves, stance, tolerances, rng), curves, stance, shown.seat)
+        return Performance(shown.plan(duration), person, stance, curves, time, nodes)
     stance, middle, turn = _stand(person, shown, centre, heading, rng)
     target = (
         centre
@@ -383,7 +393,8 @@ def _fields(shown: Shown) -> Array:
     for field, names in _JOINTS.items():
         out[:, COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
     out[:, COLUMNS["pelvis"]] = pelvis_angles(Rotation.from_quat(q[:, 3:7]).as_matrix())
-    out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
+    if not shown.seat:
+        out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
     out[:, RAISED:] = shown.raised
     return out
 

@@ -145,7 +145,7 @@ class Habits:
 @dataclass(frozen=True, eq=False)
 class Person:
     """A subject whose truth is known: ``body`` of 16 segments with its true SIP WITHOUT ``loads``, markers as glued in
-    the present session.
+    the present session, in a posture with the joints ``bent`` by so many rad beside upright standing.
     """
 
     subject: Subject
@@ -154,6 +154,7 @@ class Person:
     body: Body
     habits: Habits
     loads: tuple[AddedLoad, ...] = ()
+    bent: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def loaded_body(self) -> Body:
