@@ -9,7 +9,7 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.body.human.human import human
 from biodance.body.human.skeleton import with_optional
 from biodance.body.parts import JointError, shift_matter
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.mismatch import (
     Mismatch,

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal
 
 from biodance.body.human.scaling import measure_static
 from biodance.body.human.skeleton import JOINTS
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare

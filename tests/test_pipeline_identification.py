@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from identified_sessions import body, session_result, truth
 
+from biodance.display import spaced
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.identification import can_identify, identify_trials
@@ -120,7 +121,7 @@ def test_nothing_to_fit_is_refused_with_what_to_do():
 
 def test_the_section_shows_every_segment(found):
     text = identification_section(found)
-    assert all(f'<th scope="row">{name.replace("_", " ")}</th>' in text for name in body().segments)
+    assert all(f'<th scope="row">{spaced(name)}</th>' in text for name in body().segments)
     assert text.count('class="panel"') == 8  # masses (heavy, light), centres and inertias along three axes
     for word in ("validate_1", "From the data", "cannot be known", "No load is found beyond the table"):
         assert word in text

@@ -7,7 +7,7 @@ import pytest
 from diagnosed_sessions import RATE, body, known, motion, windows
 from inferred_sessions import inferred
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissue, unrest
 from biodance.diagnosis.problem import TrialWindow

@@ -7,7 +7,7 @@ import pytest
 from diagnosed_sessions import NOISE, body, known, motion, windows
 from inferred_sessions import inferred
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.spectrum import needed

@@ -10,7 +10,8 @@ from diagnosed_sessions import body, known, windows
 
 import biodance
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import error_rows, error_size, joint_size, read_table
+from biodance.body.tables.anthropometry import read_table
+from biodance.body.tables.error_sizes import error_rows, error_size, joint_size
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.model import nuisances
 from biodance.diagnosis.problem import problem

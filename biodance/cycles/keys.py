@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.changes import move_marker
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import About, CauseWords, CheckKind

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.display import spaced
 from biodance.identification.loads import unit_load
 from biodance.lab.markers.sets import other_side

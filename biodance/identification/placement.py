@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.posterior import find_posterior
 from biodance.lab.markers.sets import other_side

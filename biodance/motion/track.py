@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.time_axis import of_postures
 from biodance.lab.prepare import USUAL_CUTOFF, LowPass, low_pass, motion_filter

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.lab_tilt import LabTilt
 from biodance.effects.plate_crosstalk import PlateCrosstalk

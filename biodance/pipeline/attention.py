@@ -266,9 +266,12 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
-    warned = {"session.toml": result.slips, "body": (*result.doubts, *result.unused)}
+    warned: dict[str, tuple[Level, Sequence[str]]] = {"session.toml": ("warn", result.slips)}
+    warned |= {"body": ("warn", result.doubts), "subject": ("note", result.unused)}
     found += [
-        Attention("warn", text.removeprefix(WARNING), "", about) for about, said in warned.items() for text in said
+        Attention(level, text.removeprefix(WARNING), "", about)
+        for about, (level, said) in warned.items()
+        for text in said
     ]
     said = [_of_trial(trial, findings) for trial in result.trials]
     found += [line for lines in said for line in lines]

@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.model import model
 from biodance.diagnosis.problem import TrialWindow, problem

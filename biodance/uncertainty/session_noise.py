@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.records import CHANNELS, Array, Markers, Motion, Plate, Trial

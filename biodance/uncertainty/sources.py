@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.errors import UnknownName
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt

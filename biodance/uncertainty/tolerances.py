@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_rows, error_size
+from biodance.body.tables.error_sizes import error_rows, error_size
 from biodance.library import locate
 from biodance.records import Array, assign, freeze
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import false_discovery_control
 from scipy.stats import t as student
 
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
 
 FEWEST_STRIDES = 3

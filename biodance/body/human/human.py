@@ -46,10 +46,11 @@ from biodance.body.parts import (
     stretch_inertia,
     turn_inertia,
 )
-from biodance.body.tables.anthropometry import Reference, error_size, proportion, read_table, row_numbers
+from biodance.body.tables.anthropometry import Reference, proportion, read_table, row_numbers
 from biodance.body.tables.choice import PARTS, measured_whole, reference, regression, studies, study_masses, trunk_joint
 from biodance.body.tables.choice import lengths as reference_lengths
 from biodance.body.tables.choice import reference as reference_of
+from biodance.body.tables.error_sizes import error_size
 from biodance.display import spaced
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject

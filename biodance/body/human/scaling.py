@@ -22,8 +22,9 @@ from biodance.body.human.static_centres import (
     static_centres,
 )
 from biodance.body.parts import SegmentMarkers
-from biodance.body.tables.anthropometry import error_size, proportion
+from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
+from biodance.body.tables.error_sizes import error_size
 from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY

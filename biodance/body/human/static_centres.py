@@ -17,7 +17,7 @@ from biodance.body.human.measures import (
     wrist,
 )
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
 from biodance.settings import Hip
 from biodance.spatial import elementary_rotation

@@ -1,6 +1,4 @@
-"""Read one anthropometric table: a tidy CSV with the numbers and a TOML of the same name with their provenance; and the
-one table of how wrong things are, ``anthropometry/uncertainty/sizes.csv``, with source and unit.
-"""
+"""Read one anthropometric table: a tidy CSV with the numbers and a TOML of the same name with their provenance."""
 
 import csv
 import functools
@@ -124,33 +122,3 @@ def refuse_changed(path: Path, sha256: str) -> None:
             f"{path}: the numbers were changed since {path.stem}.toml was written (sha256 {digest}). "
             "Restore the file, or describe your change in the .toml and put this sha256 there."
         )
-
-
-def error_rows(*, whose: str = "believed") -> tuple[TableRow, ...]:
-    """Return the rows of the table: those ``believed``, or those that the ``virtual`` laboratory draws from."""
-    return read_table("uncertainty", "sizes").where(whose=whose)
-
-
-@functools.cache
-def error_size(quantity: str, target: str, *, state: str = "any") -> float:
-    """Return one standard deviation of an error in the unit of the table (SI, per axis).
-
-    ``state`` of a joint: "before" or "after" functional calibration; "any" for what does not depend on it.
-
-    Raises
-    ------
-    UnknownName
-        The table has no such row.
-    """
-    row = {"quantity": quantity, "target": target, "state": state, "whose": "believed"}
-    return float(read_table("uncertainty", "sizes").row(**row)["sd"])
-
-
-def joint_size(quantity: str, joint: str, *, state: str = "before") -> float:
-    """Return the size of ``joint_centre`` (m per axis) or ``tilt`` (rad) of a joint, sides alike, before any
-    functional calibration, or of a ``state`` of its own; of a joint that the table does not name that of "other" ones.
-    """
-    try:
-        return error_size(quantity, joint.removeprefix("right_").removeprefix("left_"), state=state)
-    except UnknownName:
-        return error_size(quantity, "other", state=state)

@@ -21,7 +21,7 @@ from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS, OPTIONAL_JOINTS, kind_of, with_optional
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.ik.joint_fit import (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.ik.joint_unknowns import FAULTY, SIZE, JointUnknowns, own_unknowns

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres, static_sd
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation, skew

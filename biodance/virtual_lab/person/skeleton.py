@@ -21,7 +21,7 @@ from zlib import crc32
 import numpy as np
 
 from biodance.body.parts import Joint, SegmentMarkers
-from biodance.body.tables.anthropometry import error_rows
+from biodance.body.tables.error_sizes import error_rows
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array, Subject
 
