@@ -30,9 +30,9 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.problem.plan import read_plan
 from biodance.pipeline.dance import dancer
-from biodance.pipeline.simulate_dance import simulate_dance
+from biodance.pipeline.front_dance import simulate_dance
 from biodance.records import Array
-from biodance.virtual_lab.movement.dancing import PERFORMERS
+from biodance.virtual_lab.movement.performance import PERFORMERS
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 

@@ -2,24 +2,26 @@
 imprecise people leave, what will be known, how long a design takes.
 
     OMP_NUM_THREADS=1 python -m benchmarks dance FOLDER [--protocols short easy] [--bodies reference careful]
-        [--play] [--patients 40]
+        [--play] [--patients 40] [--visits 20]
 
 A row a body and protocol, all with seed 0. Everything is kept in FOLDER: what is found there is not designed again. The
 margins are those that the design itself reports, of 200 imprecise performers. ``--play`` plays each dance in MuJoCo,
-which takes half as long as the dance. ``--patients`` designs for so many generated patients instead.
+which takes half as long as the dance. ``--patients`` designs for so many generated patients instead; ``--visits`` goes
+all the way from a template of limits to the subject's page with so many people who copy their dance restlessly.
 """
 
 import argparse
 import json
 import resource
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.people import Row
+from benchmarks.people import Row, truth_of
+from biodance import examine, read_session, simulate
 from biodance.body.human.human import human
 from biodance.body.human.skeleton import joint_limits
 from biodance.dance.cues import dance_instructions
@@ -32,7 +34,11 @@ from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, 
 from biodance.dance.problem.plan import read_plan
 from biodance.errors import BiodanceError
 from biodance.library import folder as shipped
+from biodance.pipeline.diagnosis import diagnosed_and_corrected
+from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.load import as_diagnosed
 from biodance.records import Subject
+from biodance.report.pages.feedback import write_feedback
 
 STIFF = PersonLimits(
     range_shares=(("left_shoulder", 0.5), ("left_elbow", 0.6), ("left_hip", 0.7), ("left_knee", 0.7)),
@@ -90,8 +96,8 @@ def _spent() -> float:
 
 
 HEADING = (
-    "| body | protocol | postures | s | instructions a cue: mean, most | limits kept | inside, mm | apart, mm "
-    "| mass sd, kg | CoM sd, mm | design: CPU s, wall s |\n|" + "---|" * 11
+    "| body | protocol | postures | s | instructions a cue: mean, most | limits kept | inside, mm | over the floor, mm "
+    "| apart, mm | mass sd, kg | CoM sd, mm | design: CPU s, wall s |\n|" + "---|" * 12
 )
 
 
@@ -140,9 +146,9 @@ def row(name: str, protocol: str, folder: Path) -> str:
     """Return the row of one body and protocol."""
     one = found(name, protocol, folder)
     if "refused" in one:
-        return f"| {name} | {protocol} | refused: {one['refused']} |" + " |" * 8
+        return f"| {name} | {protocol} | refused: {one['refused']} |" + " |" * 9
     mean, most = one["instructions"]
-    left = " | ".join(f"{1000 * worst:.0f}" for worst in one["left"].values()) or "– | –"
+    left = " | ".join(f"{1000 * worst:.0f}" for worst in one["left"].values()) or "– | – | –"
     mass, com = ([f"{factor * sd:.{digits}f}" for sd in one[key]] for key, factor, digits in _SIZES)
     return (
         f"| {name} | {protocol} | {one['postures']} | {one['duration_s']:.0f} | {mean:.1f}, {most} | "
@@ -174,6 +180,61 @@ def patient_rows(count: int, folder: Path) -> Iterator[str]:
     yield f"\n{good} of {count} have a safe dance in 60 s of processor time."
 
 
+_VISITORS = {
+    "stroke": Subject(70.0, 1.62, "F", 60.0),
+    "old": Subject(72.0, 1.70, "M", 80.0),
+    "amputee": Subject(80.0, 1.78, "M", 50.0),
+    "parkinson": Subject(64.0, 1.62, "F", 66.0),
+}
+_FIRST_VISITOR = 100
+"""Seed of the first one."""
+
+
+def visited(k: int, folder: Path) -> Row:
+    """Return what the subject's page says after visit ``k``: of every mass and of the weight low, high and true kg."""
+    kind, protocol = [*_VISITORS][k % len(_VISITORS)], "chair" if k % 3 == 2 else "patient"
+    path = folder / f"visit_{k}.json"
+    if path.exists():
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    who, limits = _VISITORS[kind], read_person(shipped("protocols") / "limits" / f"{kind}.toml")
+    found(kind, protocol, folder, (who, limits))
+    dance, place = Dance.load(folder / f"{kind}_{protocol}.npz"), folder / f"visit_{k}"
+    write_feedback(dance, folder / f"{kind}_{protocol}.html", force=True)
+    simulate(who, None, place, seed=_FIRST_VISITOR + k, dance=dance, performer="restless")
+    result, told = diagnosed_and_corrected(examine(read_session(place)))
+    account = account_for(as_diagnosed(result, told.diagnosis), told)
+    true = {one["name"]: one["mass_kg"] for one in truth_of("own", place)["segments_12"]}
+    parts = [one for one in (*account.parts, account.together) if one is not None and one.measured]
+    out: Row = {
+        "who": f"{kind} {_FIRST_VISITOR + k}",
+        "protocol": protocol,
+        "verdict": str(told.diagnosis.verdict),
+        "withheld": account.withheld,
+        "masses": [[one.low, one.high, sum(true[name] for name in one.segments)] for one in parts],
+        "weight": [*account.weight, sum(true.values())] if np.isfinite(account.weight[0]) else None,
+    }
+    path.write_text(json.dumps(out), encoding="utf-8")
+    return out
+
+
+def visit_rows(numbers: Sequence[int], folder: Path) -> Iterator[str]:
+    """Yield the table of visits, and at last how many numbers of the subjects' pages lie in their intervals."""
+    yield "| visit | protocol | verdict | masses shown | within | weight | no numbers because of |\n" + "|---" * 7 + "|"
+    good, shown = 0, 0
+    for k in numbers:
+        one = visited(k, folder)
+        within = [low <= true <= high for low, high, true in one["masses"]]
+        weight = one["weight"] and one["weight"][0] <= one["weight"][2] <= one["weight"][1]
+        numbered = [*within, *([weight] if one["weight"] else [])]
+        good, shown = good + sum(numbered), shown + len(numbered)
+        said = {None: "–", True: "within", False: "outside"}[weight]
+        yield (
+            f"| {one['who']} | {one['protocol']} | {one['verdict']} | {len(within)} | {sum(within)} | {said} | "
+            f"{', '.join(one['withheld']) or '–'} |"
+        )
+    yield f"\n{good} of {shown} numbers lie within their 95 % intervals."
+
+
 _SIZES = (("mass", 1.0, 2), ("com", 1000.0, 1))
 _PROTOCOLS = ("easy", "patient", "chair", "short", "full")
 
@@ -186,10 +247,12 @@ def main() -> None:
     ask.add_argument("--bodies", nargs="+", choices=tuple(BODIES), default=tuple(BODIES))
     ask.add_argument("--play", action="store_true")
     ask.add_argument("--patients", type=int, default=0)
+    ask.add_argument("--visits", type=int, default=0)
     asked = ask.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
-    if asked.patients:
-        for line in patient_rows(asked.patients, asked.folder):
+    if asked.patients or asked.visits:
+        people, visits = patient_rows(asked.patients, asked.folder), visit_rows(range(asked.visits), asked.folder)
+        for line in people if asked.patients else visits:
             print(line, flush=True)
         return
     print(HEADING, flush=True)

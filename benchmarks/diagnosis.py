@@ -33,11 +33,10 @@ from benchmarks.third_lab.write import lump_of
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array
-from biodance.virtual_lab.faults.causes import hide, parse_cause
+from biodance.virtual_lab.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import draw_laboratory, draw_visitor
-from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import FIRST_VISIT, LabVisit, draw_laboratory, draw_visitor
 
 COLUMNS = ("real", "foreign", "third", "own", "drawn", "home")
 HOME = ("squat", "short", "easy", "diagnosis")

@@ -23,9 +23,9 @@ from scipy.spatial.transform import Rotation
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
 from biodance.motion.kinematics import poses
-from biodance.pipeline.simulate_dance import stretches
+from biodance.pipeline.front_dance import stretches
 from biodance.records import SIDES, Array
-from biodance.virtual_lab.movement.dancing import SMOOTH, WANDER, Shown
+from biodance.virtual_lab.movement.performance import SMOOTH, WANDER, Shown
 
 TRIAL = 10.0
 """s of a trial of the foreign laboratory."""

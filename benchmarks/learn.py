@@ -28,16 +28,16 @@ from biodance.diagnosis.learning import Null, learn_tolerances, null_of
 from biodance.diagnosis.problem import problem
 from biodance.lab.session.read import read_session
 from biodance.library import folder
+from biodance.pipeline.front_dance import simulate_dance
 from biodance.pipeline.identification import FITTED_ROLES
 from biodance.pipeline.judged_trials import windows
 from biodance.pipeline.session import examine, identification_of
-from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import Array, Subject
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
-from biodance.virtual_lab.movement.dancing import PERFORMERS
+from biodance.virtual_lab.movement.performance import PERFORMERS
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import LabVisit
 
 TABLES = folder("anthropometry") / "uncertainty"
 VISITS = [(i, 500 + i, 0) for i in range(20)] + [(i, 500 + i, 1) for i in range(10)]

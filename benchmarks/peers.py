@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from benchmarks.people import first_seed
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.inertia import smallest_eigenvalues
+from biodance.body.parts import smallest_eigenvalues
 from biodance.identification.identification import identify_body
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.paper_programme import paper_programme

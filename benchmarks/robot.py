@@ -23,9 +23,9 @@ import numpy as np
 from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
-from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.parts import smallest_eigenvalues
+from biodance.body.similarity import SimilarityScale, similar_body, standing_frames
+from biodance.body.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
 from biodance.dance.robot import person_sized, shrunk

@@ -32,7 +32,7 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Array, Session
 from biodance.uncertainty.tolerances import shipped
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
 SESSIONS = (*CHILDREN, "adl_gait", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "pycgm",

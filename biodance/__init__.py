@@ -35,27 +35,27 @@ if TYPE_CHECKING:
     from biodance.errors import TrialRefused as TrialRefused
     from biodance.errors import UnknownName as UnknownName
     from biodance.identification.identification import Identification as Identification
-    from biodance.lab.read import read_trial as read_trial
+    from biodance.lab.readers import read_trial as read_trial
     from biodance.lab.readers.c3d import read_c3d as read_c3d
     from biodance.lab.session.read import read_session as read_session
     from biodance.motion.dynamics import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
-    from biodance.pipeline.dance_result import DanceResult as DanceResult
+    from biodance.pipeline.dance import DanceResult as DanceResult
     from biodance.pipeline.diagnosis import SessionDiagnosis as SessionDiagnosis
     from biodance.pipeline.export import export as export
     from biodance.pipeline.front import SessionComparison as SessionComparison
     from biodance.pipeline.front import compare_sessions as compare_sessions
     from biodance.pipeline.front import diagnose as diagnose
     from biodance.pipeline.front import identify as identify
+    from biodance.pipeline.front import register as register
     from biodance.pipeline.front_dance import design_dance as design_dance
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
+    from biodance.pipeline.laboratory import judge_plates as judge_plates
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.movement import SessionMovement as SessionMovement
     from biodance.pipeline.movement import describe_movement as describe_movement
-    from biodance.pipeline.plates import judge_plates as judge_plates
-    from biodance.pipeline.registration import register as register
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
@@ -81,20 +81,19 @@ HOMES = {
     "errors": ("BiodanceError", "FileRefused", "MissingLibrary", "SessionRefused", "TrialRefused", "UnknownName"),
     "identification.identification": ("Identification",),
     "lab.readers.c3d": ("read_c3d",),
-    "lab.read": ("read_trial",),
+    "lab.readers": ("read_trial",),
     "lab.session.read": ("read_session",),
     "motion.dynamics": ("predict_wrench",),
     "motion.track": ("track",),
-    "pipeline.dance_result": ("DanceResult",),
+    "pipeline.dance": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
-    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
+    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify", "register"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
     "pipeline.movement": ("SessionMovement", "describe_movement"),
-    "pipeline.plates": ("judge_plates",),
-    "pipeline.registration": ("register",),
+    "pipeline.laboratory": ("judge_plates",),
     "pipeline.stream": ("stream_recording",),
     "pipeline.results": ("SessionResult",),
     "pipeline.robot": ("identify_robot",),

@@ -69,8 +69,14 @@ def digits(value: float, count: int) -> str:
     return f"{float(f'{value:.{count}g}'):g}"
 
 
+_JOINED = {"trunk_head": "trunk with head", "forearm_hand": "forearm with hand"}
+"""Parts of the body that one segment holds together."""
+
+
 def spaced(name: str) -> str:
-    """Return a name as words: ``left forearm hand``."""
+    """Return a name as words: ``left forearm with hand``."""
+    for joined, said in _JOINED.items():
+        name = name.replace(joined, said)
     return name.replace("_", " ")
 
 
@@ -141,7 +147,7 @@ def intervals(rows: Sequence[Interval], *, axes: "Axes | None" = None) -> "Axes"
         inside = {"known": GREEN, "partly known": "#8FD1B9", "cannot be known": "white"}[row.known]
         edge = BLACK if row.known == "cannot be known" else GREEN
         drawn.plot(row.after[0], y - 0.17, marker="o", color=edge, markersize=5.5, markerfacecolor=inside)
-    drawn.set_yticks(place, [row.name.replace("_", " ") for row in rows])
+    drawn.set_yticks(place, [spaced(row.name) for row in rows])
     drawn.set_ylim(-0.7, len(rows) - 0.3)
     drawn.grid(axis="y", visible=False)
     return drawn

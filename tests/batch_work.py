@@ -8,8 +8,7 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from biodance.batch.outcome import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of
-from biodance.batch.work import process_session
+from biodance.batch.work import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of, process_session
 from biodance.lab.session.results_folder import write_manifest
 
 

@@ -11,9 +11,9 @@ from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.lab.markers.signals import MarkerGaps
-from biodance.motion.quiet_standing import QuietStanding
-from biodance.pipeline.provenance import provenance
+from biodance.motion.newton import QuietStanding
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.trial_result import (
     Check,
     MarkerFit,

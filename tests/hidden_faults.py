@@ -13,10 +13,10 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Array, Plate, Subject
-from biodance.virtual_lab.faults.causes import hide, parse_cause
+from biodance.virtual_lab.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import LabVisit
 
 SUBJECT = Subject(64.0, 1.72, "F", 30.0)
 TRIALS = ("static", "move_1", "move_5")

@@ -19,7 +19,7 @@ from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_
 from biodance.lab.plates.sense import gravity_sign, sensor_below, with_loads_on_plates
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, Markers
-from biodance.virtual_lab.recording.visit import Fault, Recording
+from biodance.virtual_lab.visit import Fault, Recording
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ walks.
 
 import numpy as np
 
-from biodance.lab.opensim_tables import Y_UP_TO_Z_UP, TimeTable, write_mot
+from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, write_mot
 from biodance.lab.readers.trc import write_trc
 from biodance.records import Markers, Plate, Wrench
 from biodance.spatial import wrench_about_point

@@ -15,11 +15,11 @@ from robots import biped
 from small_dances import BODY, small_dance
 
 from biodance.body.body import body_text, read_body
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.opensim_tables import read_mot, write_mot
+from biodance.lab.program_tables import read_mot, write_mot
 from biodance.lab.readers.amti_text import read as read_amti_ascii
 from biodance.lab.readers.bsf import read as read_bsf
 from biodance.lab.readers.c3d import read_c3d
@@ -27,7 +27,7 @@ from biodance.lab.readers.trc import read_trc, write_trc
 from biodance.lab.robot import read_encoders
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.results_folder import check_results, write_manifest
-from biodance.pipeline.lab_file import read_lab
+from biodance.pipeline.laboratory import read_lab
 from biodance.records import Trial
 from biodance.report.laboratory import to_toml
 from biodance.uncertainty.tolerances import shipped

@@ -10,7 +10,7 @@ import numpy as np
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Motion, Plate, Source, Subject, Trial, Wrench
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
+from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")
 PLATE = np.array([[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [0.5, -0.5, 0.0]])

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.lab.markers.sets import LANDMARKS, MarkerSet, landmark, read_marker_set, segment_of
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.library import read_toml
 from biodance.records import Array, Markers, Trial
 

@@ -11,8 +11,8 @@ from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
 from biodance.body.export import write_model
-from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.similarity import hoap3
+from biodance.body.urdf import read_urdf
 from biodance.lab.robot import read_robot_recording
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.records import Array, Sip

@@ -3,6 +3,7 @@
 import errno
 import io
 import json
+import socket
 import tomllib
 import zipfile
 from collections.abc import Iterator
@@ -13,9 +14,10 @@ from lab_sessions import two_trials, write_trial
 from starlette.testclient import TestClient
 
 from biodance.app.guard import LARGEST_BODY, POLICY
-from biodance.app.server import window_application
+from biodance.app.server import serve_window, window_application
 from biodance.app.sessions import Archive
 from biodance.errors import BiodanceError
+from biodance.library import names
 
 PORT, TOKEN = 8123, "a-token"
 HOME = f"http://127.0.0.1:{PORT}"
@@ -329,6 +331,15 @@ def test_results_do_not_go_among_recordings(archive, tmp_path, out):
         Archive(archive.folder, tmp_path / out)
 
 
+def test_a_port_that_another_program_has_is_refused(archive, tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(BiodanceError, match=f"--port {port}.*Give another one, or 0 for any"):
+            serve_window(archive.folder, tmp_path / "results", port=port, opened=False)
+
+
 def test_a_folder_without_a_session_is_refused(tmp_path):
     with pytest.raises(BiodanceError, match="no session"):
         Archive(tmp_path, tmp_path.with_name("results"))
@@ -438,3 +449,14 @@ def test_the_corrected_copies_among_the_results_are_opened_as_a_session(user, ar
     write_trial(copies, "static")
     assert [row["name"] for row in post(user, "open", folder=str(copies))["rows"]] == ["corrected"]
     assert [one["stem"] for one in viewed(user, "corrected")["trials"]] == ["static"]
+
+
+def test_the_form_is_asked_and_the_file_saved_through_the_server(user) -> None:
+    assert set(user.get("/api/form").json()["templates"]) == {"nobody", *names("protocols/limits")}
+    values = json.dumps({"seat_height_m": 0.5})
+    found = user.get("/download", params={"format": "limits", "template": "nobody", "values": values})
+    assert found.headers["content-disposition"] == 'attachment; filename="person.toml"'
+    assert tomllib.loads(found.text) == {"seat_height_m": 0.5}
+    for wrong in ("[]", "{", json.dumps({"seat_height_m": "high"})):
+        answer = user.get("/download", params={"format": "limits", "template": "nobody", "values": wrong})
+        assert answer.status_code == 400, wrong

@@ -14,6 +14,9 @@ from accessible import ASKED, complaints
 from browser import Page
 from hidden_faults import hidden
 
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.c3d.results import write_exchanged
+
 pytestmark = ASKED
 TABS = ("trials", "markers", "steps", "quality", "gait", "body", "files")
 
@@ -22,6 +25,11 @@ TABS = ("trials", "markers", "steps", "quality", "gait", "body", "files")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("window") / "archive"
     hidden(folder / "S01", trials=("static", "squat_1"))
+    squats = hidden(folder / "S03", trials=("static", "squat_1")) / "squat_1.c3d"
+    exchanged = write_exchanged(
+        squats, folder / "squat_1.c3d", {("LASI", "RASI"): ((0, len(read_raw(squats).points)),)}
+    )
+    exchanged.replace(squats)
     (folder / "S02").mkdir()
     (folder / "S02" / "static.c3d").write_bytes(b"no recording")
     return folder
@@ -41,7 +49,7 @@ def address(archive: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def browser(address: str) -> Iterator[Page]:
     with Page(address) as page:
-        page.until("document.querySelectorAll('tbody tr').length === 2")
+        page.until("document.querySelectorAll('tbody tr').length === 3")
         yield page
 
 
@@ -235,8 +243,35 @@ def test_nobody_is_shut_out_of_a_tab(browser, tab):
     browser.send("Emulation.clearDeviceMetricsOverride")
 
 
+def test_a_person_s_limits_are_filled_in_and_saved(browser, tmp_path):
+    go(browser, "#limits", "document.querySelector('[data-key=template]')")
+    choose(browser, "[data-key=template]", "stroke")
+    browser.until("document.querySelector('[data-key=reason]').value === 'stroke, left side'")
+    choose(browser, '[data-key="deg left_arm_forward"]', "65")
+    choose(browser, '[data-key="strength left_arm"]', "grade 4")
+    browser.run("document.querySelector('[data-key=\"hold_frame right\"]').click()")
+    browser.until("document.querySelector('[data-key=file]').textContent.includes('\\nhold_frame = [\"right\"]')")
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    choose(browser, "[data-key=seat_height_m]", "6")
+    browser.until("document.querySelector('#said').textContent.includes('between 0.3 and 1.2')")
+    assert not browser.run("document.querySelector('main a.button')")
+    choose(browser, "[data-key=seat_height_m]", "0.6")
+    browser.until("Boolean(document.querySelector('main a.button'))")
+    browser.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    press(browser, "Save person.toml")
+    end = time.monotonic() + 60
+    while not (tmp_path / "person.toml").exists():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    saved = tomllib.loads((tmp_path / "person.toml").read_text(encoding="utf-8"))
+    assert saved["at_most_deg"]["left arm forward"] == 65
+    assert saved["strength"] == {"left_arm": "grade 4", "left_leg": 0.7}
+    assert (saved["hold_frame"], saved["seat_height_m"]) == (["right"], 0.6)
+
+
 def test_another_folder_is_chosen_in_the_window(browser, archive):
-    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
     chooser = "document.querySelector('[data-key=folder]')"
     found = "Boolean(document.querySelector('[aria-label=\"Look into S01\"]'))"
     browser.until(f"{found} || ({chooser}.parentElement.open || {chooser}.click(), false)")
@@ -251,11 +286,11 @@ def test_another_folder_is_chosen_in_the_window(browser, archive):
         f"body: JSON.stringify({{folder: {str(archive)!r}}})}})"
     )
     go(browser, "#/S01/trials", "document.querySelector('[data-key=mass_kg]')")
-    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
 
 
 def test_nobody_is_shut_out_of_the_list_or_a_session_that_cannot_be_read(browser):
-    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 2")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
     assert complaints(browser) == []
     go(browser, "#/S02/trials", "document.querySelector('.verdict.fail')")
     assert "static.c3d" in browser.run("document.querySelector('.verdict.fail').textContent")
@@ -270,6 +305,45 @@ def test_tabs_are_reached_with_the_keyboard(browser):
         "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
     )
     assert browser.until("document.activeElement.id === 'tab-gait' && document.activeElement.ariaSelected === 'true'")
+
+
+def test_two_labels_are_exchanged_from_the_finding_after_before_and_after_are_seen(browser, archive):
+    go(browser, "#/S03/quality", "document.querySelector('h1').textContent === 'S03'")
+    browser.run("document.querySelector('[data-key=run]').click()")
+    correct = "document.querySelector('[data-key=\"correct LASI/RASI\"]')"
+    browser.until(f"Boolean({correct})", 240)
+    assert browser.run(f"{correct}.textContent") == "Exchange LASI and RASI in squat_1 …"
+    browser.run(f"{correct}.click()")
+    browser.until("Boolean(document.querySelector('[data-key=write]'))", 120)
+    assert not (archive / "S03" / "session.toml").read_text(encoding="utf-8").count("exchange")
+    rows = (
+        "[...document.querySelectorAll('.compared tbody tr')].map(one => [...one.cells].map(cell => cell.textContent))"
+    )
+    far = {when: float(cells[-1]) for trial, when, *cells in browser.run(rows) if trial == "squat_1"}
+    assert far["after"] < 0.5 * far["before"]
+    assert complaints(browser) == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    browser.run("document.querySelector('[data-key=write]').click()")
+    browser.until("document.querySelector('#run').textContent.includes('Stop')", 60)
+    browser.until("document.querySelector('[data-key=run]')?.textContent === 'Results are up to date'", 240)
+    said = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))
+    assert said["trials"]["squat_1"]["exchange"] == [["LASI", "RASI"]]
+    assert not browser.run(f"Boolean({correct})")
+
+
+def test_two_quick_changes_are_both_written(browser, archive):
+    go(browser, "#/S03/trials", "document.querySelector('[data-key=age]')")
+    browser.run(
+        "for (const [key, value] of [['age', '41'], ['height_m', '1.71']]) { const one = document.querySelector("
+        "`[data-key=${key}]`); one.value = value; one.dispatchEvent(new Event('change')); }"
+    )
+    end = time.monotonic() + 30
+    subject: dict = {}
+    while (subject.get("age"), subject.get("height_m")) != (41, 1.71):
+        assert time.monotonic() < end, subject
+        time.sleep(0.1)
+        subject = tomllib.loads((archive / "S03" / "session.toml").read_text(encoding="utf-8"))["subject"]
+    assert browser.run("document.querySelector('#said').hidden")
 
 
 def test_nothing_is_asked_of_the_network_and_nothing_fails(browser, address):

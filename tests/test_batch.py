@@ -20,11 +20,17 @@ import pandas as pd
 import pytest
 
 import biodance
-from biodance.batch.engines import _submitted
-from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, fingerprint_of
-from biodance.batch.run import LEDGER, Ledger, run_batch
+from biodance.batch.run import LEDGER, Ledger, _submitted, run_batch
 from biodance.batch.summary import outliers, summary_table
-from biodance.batch.work import ROW_TYPES, process_session, trial_rows
+from biodance.batch.work import (
+    ROW_TYPES,
+    Outcome,
+    SessionStatus,
+    SessionTask,
+    fingerprint_of,
+    process_session,
+    trial_rows,
+)
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.pipeline.trial import attempt
@@ -243,7 +249,7 @@ def test_a_scheduler_that_goes_away_is_one_sentence(tmp_path: Path, monkeypatch)
         raise distributed.CancelledError("scheduler-connection-lost")
 
     monkeypatch.setattr(distributed, "Client", lambda *_, **__: nullcontext())
-    monkeypatch.setattr("biodance.batch.engines._on_cluster", lost)
+    monkeypatch.setattr("biodance.batch.run._on_cluster", lost)
     with pytest.raises(BiodanceError, match=r"scheduler went away.*run the same command"):
         run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="tcp://x", work=batch_work.count)
 

@@ -16,7 +16,7 @@ from biodance.body.export.urdf import roll_pitch_yaw
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError, FileRefused, UnknownName
-from biodance.lab.opensim_tables import read_mot, write_mot
+from biodance.lab.program_tables import read_mot, write_mot
 from biodance.motion.dynamics import joint_torques, regressor
 from biodance.motion.kinematics import poses
 from biodance.pipeline.program_folders import opensim_coordinates

@@ -9,7 +9,7 @@ import pytest
 from biodance.body.body import body_text, read_body
 from biodance.body.human.human import human
 from biodance.body.parts import JointError
-from biodance.body.robot.hoap3 import hoap3
+from biodance.body.similarity import hoap3
 from biodance.errors import FileRefused
 from biodance.records import Subject
 

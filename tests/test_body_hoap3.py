@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.robot.hoap3 import _SEGMENTS, hoap3
+from biodance.body.parts import smallest_eigenvalues
+from biodance.body.similarity import _SEGMENTS, hoap3
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.cli import run
 from biodance.identification.base_parameters import structural_base

@@ -14,7 +14,7 @@ from biodance.body.human.measures import (
 from biodance.body.human.scaling import chain_angles, measure_static
 from biodance.body.human.skeleton import standing_tilt
 from biodance.body.human.static_centres import arm_centres
-from biodance.body.inertia import smallest_eigenvalues
+from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session

@@ -12,9 +12,8 @@ from robots import biped
 
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
-from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.similarity import SimilarityScale, reframed, similar_body, sole_normal, standing_frames
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.similarity import SimilarityScale, hoap3, reframed, similar_body, sole_normal, standing_frames
+from biodance.body.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import poses

@@ -5,10 +5,9 @@ import shutil
 import numpy as np
 import pytest
 
-from biodance.body.human.human import human
-from biodance.body.human.prior import disagreement, primitive_covariance, scaled_lumps
+from biodance.body.human.human import disagreement, human, primitive_covariance, scaled_lumps
 from biodance.body.human.skeleton import SEGMENTS, generic_skeleton, peak_torque
-from biodance.body.inertia import (
+from biodance.body.parts import (
     TENSOR,
     RigidInertia,
     inertial_parameters,

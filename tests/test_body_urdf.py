@@ -13,8 +13,8 @@ from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
-from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.similarity import hoap3
+from biodance.body.urdf import read_urdf
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from robots import BOX, biped
 
-from biodance.body.robot.urdf import read_urdf
-from biodance.body.robot.urdf_file import CORNERS, match_faces, sole_outline
+from biodance.body.urdf import read_urdf
+from biodance.body.urdf_file import CORNERS, match_faces, sole_outline
 from biodance.errors import FileRefused
 from biodance.motion.kinematics import poses
 

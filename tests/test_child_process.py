@@ -101,7 +101,7 @@ def test_python_m_biodance_imports_nothing_of_the_working_folder(tmp_path: Path)
 
 
 def test_what_else_is_started_keeps_its_own_folder(monkeypatch) -> None:
-    from biodance.batch.engines import _process
+    from biodance.batch.run import _process
 
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
     with _process() as pool:

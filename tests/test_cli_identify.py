@@ -14,7 +14,7 @@ from biodance.body.export.csv import STANDARD
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.effects import QualityCheck
-from biodance.lab.opensim_tables import read_mot
+from biodance.lab.program_tables import read_mot
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
 SAID = "A and B carry each other's names. Exchange them, or accept the correction."
@@ -62,7 +62,7 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     )
     out = capsys.readouterr().out
     assert " ".join(out.split()).startswith(SAID)
-    assert "trunk head" in out
+    assert "trunk with head" in out
 
 
 def test_nothing_to_identify_is_one_sentence(lab, capsys):

@@ -23,14 +23,20 @@ from biodance.cycles.strides import Stride
 from biodance.errors import SessionRefused
 from biodance.pipeline import visits as pipeline
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.visit_quantities import Untested, cycle_quantities
-from biodance.pipeline.visits import ExaminedVisit, VisitComparison, compare_visits, read_visits
+from biodance.pipeline.visits import (
+    ExaminedVisit,
+    Untested,
+    VisitComparison,
+    compare_visits,
+    cycle_quantities,
+    read_visits,
+)
 from biodance.records import Session, Subject
 from biodance.report.visits import comparison_sentence, write_visits
 from biodance.uncertainty.visits import KeyKind, beyond_chance, change_of_mean, placement_sd, visit_mean
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.visit import LabVisit, perform_in
 from biodance.virtual_lab.simulate import write_visit
+from biodance.virtual_lab.visit import LabVisit, perform_in
 
 SPEED = 0.9
 """m/s at a stature of 1.75 m; in proportion to the root of the stature."""

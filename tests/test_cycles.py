@@ -20,14 +20,7 @@ from biodance.cycles.curves import (
     normal_of,
     normal_toml,
 )
-from biodance.cycles.cut import (
-    Cycle,
-    agreement_of_events,
-    gait_cycles,
-    joined_events,
-    kinematic_events,
-    repetitions,
-)
+from biodance.cycles.cut import Cycle, agreement_of_events, gait_cycles, joined_events, kinematic_events, repetitions
 from biodance.cycles.movement import trial_movement
 from biodance.cycles.strides import mean_values, strides, vertical_stiffness
 from biodance.lab.c3d.subject import FileEvent, FileOutputs

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.problem.excitation import excitation_blocks
@@ -16,7 +16,7 @@ from biodance.dance.problem.plan import read_plan
 from biodance.dance.verify import broken, dance_metrics, verify
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.motion.kinematics import poses, segment_motion
 from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer
 from biodance.records import Subject

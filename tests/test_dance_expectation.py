@@ -8,7 +8,7 @@ import pytest
 from small_dances import BODY
 
 from biodance.body.human.human import human
-from biodance.body.robot.hoap3 import hoap3
+from biodance.body.similarity import hoap3
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import (
@@ -31,7 +31,7 @@ from biodance.identification.mismatch import mismatch, temper
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.dynamics import predict_wrench, regressor
-from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.dance import DanceResult
 from biodance.records import Motion, Subject
 from biodance.report.dance import dance_document
 from biodance.uncertainty.caution import widened_prior
@@ -106,7 +106,7 @@ def test_what_came_of_an_emphasis_is_said_and_why_it_is_no_more() -> None:
     plan = replace(PLAN, weights=(("left_forearm_hand", 1.0),), other_weight=0.0)
     result = DanceResult(BODY, plan, None, (), None, expected(0.5, 0.010), "", (), 1.0)
     (said,) = result.emphasis
-    assert "Emphasis on the left forearm hand: its mass becomes known to 0.50 kg (table: 1.00)" in said
+    assert "Emphasis on the left forearm with hand: its mass becomes known to 0.50 kg (table: 1.00)" in said
     assert "sides are alike (correlation in the table 0.80)" in said
     assert replace(result, plan=PLAN).emphasis == ()
     told = result.expectation

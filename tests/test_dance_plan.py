@@ -17,7 +17,7 @@ from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, limit_body, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.errors import BiodanceError, UnknownName
-from biodance.pipeline.dance_result import plate_sentence, plates_too_small
+from biodance.pipeline.dance import plate_sentence, plates_too_small
 from biodance.records import Session, Subject
 from biodance.report.pages.feedback import scene_of
 

@@ -13,9 +13,8 @@ from robots import biped
 
 from biodance.body.export import write_model
 from biodance.body.human.human import human
-from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.similarity import standing_frames
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.similarity import hoap3, standing_frames
+from biodance.body.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family

@@ -18,7 +18,7 @@ from biodance.dance.problem.splines import Phase, basis_at, rest_to_rest
 from biodance.dance.problem.state import State
 from biodance.dance.verify import Margin, _least, broken, dance_metrics, verify
 from biodance.errors import BiodanceError
-from biodance.pipeline.dance_result import DanceResult, not_safe
+from biodance.pipeline.dance import DanceResult, not_safe
 from biodance.report.dance import write_dance
 
 

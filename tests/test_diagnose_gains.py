@@ -14,7 +14,7 @@ from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.effects import NamedCause, effect
 from biodance.identification.identification import identify_body
 from biodance.inference.decision import Inferred
-from biodance.pipeline import gains
+from biodance.pipeline import accepted as gains
 from biodance.pipeline.judged_trials import cases_of
 
 

@@ -8,7 +8,7 @@ from human_cases import human_case
 
 from biodance.body.changes import move_joint, move_marker, recentre_joint
 from biodance.body.human.human import human
-from biodance.body.inertia import shift_matter
+from biodance.body.parts import shift_matter
 from biodance.effects import effect
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses

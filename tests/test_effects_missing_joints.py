@@ -10,8 +10,7 @@ from human_cases import CORNERS, human_case, moving
 from biodance.body.body import Body
 from biodance.body.changes import recentre_joint
 from biodance.body.human.human import human
-from biodance.body.inertia import shift_matter, smallest_eigenvalues
-from biodance.body.parts import JointError
+from biodance.body.parts import JointError, shift_matter, smallest_eigenvalues
 from biodance.diagnosis.accept import case_fit
 from biodance.effects import Case, effect
 from biodance.effects.head_joint import HeadJoint

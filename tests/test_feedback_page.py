@@ -351,7 +351,7 @@ def test_the_page_rests_shows_first_and_speaks_only_when_asked_by_a_voice_of_thi
     assert browser.run("spoken") == [], "off unless asked for"
     own = "own = [{ localService: false, lang: 'en-GB' }, { localService: true, lang: 'en-GB' }]; "
     browser.run("by('speak').checked = by('first').checked = true; speak('one')")
-    assert "no English voice of its own" in browser.run("by('said').textContent")
+    assert "no voice of its own for this language" in browser.run("by('said').textContent")
     browser.run(own + "second = cues[1].hold_s - 0.05" + frame)
     assert browser.run("spoken.at(-1)") == " ".join(["Stand still. Next:", *cue["calls"]]).replace("°", " degrees")
     slow = 2 * (cue["hold_s"] - cue["move_s"]) - 0.5  # the slow motion, which the hold is too short for

@@ -19,8 +19,7 @@ from lab_sessions import person, plate
 from squatting import BODY as SQUATTING
 from squatting import squat
 
-from biodance.batch.outcome import SessionStatus, SessionTask, outcome_of
-from biodance.batch.work import process_session
+from biodance.batch.work import SessionStatus, SessionTask, outcome_of, process_session
 from biodance.body.human.human import human
 from biodance.body.solids import segment_solids
 from biodance.cli.virtual import _simulated_anew

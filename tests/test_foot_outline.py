@@ -8,8 +8,7 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.errors import SessionRefused
-from biodance.lab.session.file import read_session_file
-from biodance.lab.shape import traced_outline, typed_outline
+from biodance.lab.session.file import read_session_file, traced_outline, typed_outline
 from biodance.records import FootSizes, Subject
 
 MAN = Subject(78.1, 1.777, "M", 30.0)

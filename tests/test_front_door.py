@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import biodance
-from biodance.pipeline.provenance import _UNKNOWN, blas, commit
+from biodance.pipeline.saved_results import _UNKNOWN, blas, commit
 
 DOOR = Path(biodance.__file__)
 

@@ -9,14 +9,12 @@ import pytest
 from generated_people import GeneratedPerson, generate_person, measured_lengths
 
 from biodance.body.body import parse_body
-from biodance.body.human.human import human
+from biodance.body.human.human import human, prior
 from biodance.body.human.opinions import stadium, stadium_stack
-from biodance.body.human.prior import prior
 from biodance.body.human.skeleton import SEGMENTS, generic_skeleton
 from biodance.body.tables.choice import reference
 from biodance.errors import SessionRefused
-from biodance.lab.session.file import read_session_file
-from biodance.lab.shape import legal_girths, usual_girths
+from biodance.lab.session.file import legal_girths, read_session_file, usual_girths
 from biodance.records import Sip, Subject
 from biodance.settings import Settings
 from biodance.uncertainty.caution import widened_prior

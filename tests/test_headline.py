@@ -10,7 +10,7 @@ from example_results import LEFT, VERDICTS
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DOUBTS, STRANGE, DiagnosisStatus, Reason
 from biodance.effects import causes
-from biodance.pipeline.headline import headline
+from biodance.pipeline.attention import headline
 from biodance.records.attention import Attention, Judged
 
 FORBIDDEN = re.compile(

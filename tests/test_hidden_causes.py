@@ -17,7 +17,7 @@ from hidden_faults import SUBJECT, TRIALS, hidden
 
 from biodance.cli import run
 from biodance.records import Subject
-from biodance.virtual_lab.faults.causes import Hidden, parse_cause
+from biodance.virtual_lab.causes import Hidden, parse_cause
 
 PEOPLE = {
     "woman": (SUBJECT, 41),

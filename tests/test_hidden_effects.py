@@ -16,7 +16,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.identification.physical import FailedFit
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 
 def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,7 +131,7 @@ def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
 
 def test_a_real_walk_gets_no_name_that_feet_and_clocks_exclude(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     diagnosis = found(data / "adl_gait", monkeypatch)
-    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.verdict == "nothing wrong"
     assert not diagnosis.findings
 
 

@@ -7,9 +7,8 @@ import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.human.human import human
-from biodance.body.human.optional_joints import with_optional
-from biodance.body.inertia import shift_matter
-from biodance.body.parts import JointError
+from biodance.body.human.skeleton import with_optional
+from biodance.body.parts import JointError, shift_matter
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.mismatch import (

@@ -10,7 +10,7 @@ from direct_information import information
 from identify_trials import person
 from random_bodies import random_body, random_motion
 
-from biodance.body.inertia import smallest_eigenvalues
+from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import NotSolved
 from biodance.identification import physical
 from biodance.identification.information import Information, fold

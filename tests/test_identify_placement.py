@@ -8,8 +8,7 @@ import pytest
 from joint_cases import displaced, hidden, scaling
 
 from biodance.body.body import Body, body_text, parse_body
-from biodance.body.inertia import rigid_inertia
-from biodance.body.parts import JointError
+from biodance.body.parts import JointError, rigid_inertia
 from biodance.identification.information import Information
 from biodance.identification.knowledge import known_together
 from biodance.identification.placement import matter_follows_joint, more_probable_table, with_matter_placed, with_sides

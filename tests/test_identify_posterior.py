@@ -7,7 +7,7 @@ import pytest
 from direct_information import information
 from random_bodies import random_body, random_motion
 
-from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
+from biodance.body.parts import pseudo_inertia, smallest_eigenvalues
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import find_posterior
 from biodance.motion.dynamics import predict_wrench, regressor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
+from biodance.body.parts import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import NOISE_ALONE, conclude, identify_body
 from biodance.identification.knowledge import knowledge, segment_quantities

@@ -11,8 +11,8 @@ from lab_sessions import GRAVITY, MASS, table_of, write_trial
 
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file, inspect_paths
-from biodance.lab.opensim_tables import write_mot
-from biodance.lab.read import read_trial
+from biodance.lab.program_tables import write_mot
+from biodance.lab.readers import read_trial
 from biodance.lab.readers.trc import write_trc
 
 KEYS = {

@@ -11,7 +11,7 @@ from lab_sessions import two_trials
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.read import read_trial, reader_of
+from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.session.read import read_session
 from biodance.records import Source
 

@@ -14,8 +14,8 @@ from lab_sessions import GRAVITY, MASS, plate, roles, said, table_of, two_trials
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from biodance.errors import SessionRefused
-from biodance.lab.opensim_tables import write_mot
-from biodance.lab.read import read_trial
+from biodance.lab.program_tables import write_mot
+from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import role_by_name
 from biodance.lab.session.results_folder import results_folder

@@ -8,7 +8,7 @@ from lab_sessions import person
 
 from biodance import read_session
 from biodance.lab.markers.sets import recognise
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.lab.session.subject import stature_of_markers, stature_of_movement
 from biodance.records import Markers, Source, Trial
 

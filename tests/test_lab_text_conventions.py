@@ -13,8 +13,8 @@ from lab_sessions import person, plate, table_of, write_trial
 
 from biodance import read_c3d, read_session, read_trial
 from biodance.errors import FileRefused
-from biodance.lab.opensim_tables import read_mot, write_mot
 from biodance.lab.plain_text import with_points
+from biodance.lab.program_tables import read_mot, write_mot
 from biodance.lab.readers.mot import plates_of
 from biodance.lab.readers.trc import beside, read_trc, write_trc
 from biodance.observations import recording

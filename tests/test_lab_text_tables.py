@@ -7,7 +7,7 @@ import pytest
 from lab_sessions import table_of
 
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.opensim_tables import TimeTable, read_mot, write_mot
+from biodance.lab.program_tables import TimeTable, read_mot, write_mot
 from biodance.lab.readers.mot import has_plates, plates_of
 from biodance.records import Plate, Wrench
 

@@ -5,7 +5,7 @@ Windows.
 import pytest
 
 from biodance.errors import FileRefused
-from biodance.lab.vicon import read_enf, read_mp, read_vsk
+from biodance.lab.session.recordings import read_enf, read_mp, read_vsk
 
 
 def write(tmp_path, name, text, encoding="utf-8", end="\r\n"):

@@ -12,10 +12,10 @@ from biodance.pipeline.session import examine
 from biodance.records import LeftOut
 from biodance.records.attention import Judged, seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
-from biodance.virtual_lab.faults.causes import hide, parse_cause
+from biodance.virtual_lab.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import LabVisit
 
 
 def test_a_frame_counts_once_at_the_first_gate() -> None:

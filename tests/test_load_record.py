@@ -35,9 +35,9 @@ def test_the_finding_is_the_record_of_the_search(named: tuple[Finding, ...]) -> 
     assert tuple(numbers["parameters"]["mass"]["ci95"]) == tuple(record["ci95_kg"])
     np.testing.assert_array_equal(numbers["parameters"]["place"]["value"], record["place_m"])
     assert [a["target"] for a in numbers["set"]] == list(record["set"]) == [name for name, _ in FOREARM]
-    assert in_words(one) == "added mass left forearm hand or left upper arm (mass 2.4 ± 0.6 kg)"
+    assert in_words(one) == "added mass left forearm with hand or left upper arm (mass 2.4 ± 0.6 kg)"
     assert sizes_in_words(numbers["parameters"]) == "mass 2.40 ± 0.59 kg, place 10, −120, 20 ± 2, −24, 4 mm"
-    assert "2.40 kg on the left forearm hand (80 % probable) or left upper arm" in say_load(search)
+    assert "2.40 kg on the left forearm with hand (80 % probable) or left upper arm" in say_load(search)
 
 
 def test_a_load_is_never_beside_nothing_wrong() -> None:
@@ -93,7 +93,7 @@ def test_a_place_on_another_segment_widens_the_set() -> None:
     other = replace(sure, lies_on="pelvis")
     assert other.segments == ("trunk_head", "pelvis")
     text = say_load(other)
-    assert "on the trunk head (99 % probable) or pelvis" in text
+    assert "on the trunk with head (99 % probable) or pelvis" in text
     assert "there the pelvis is nearer" in text
     record = added_mass_document(other)
     assert (record["segment"], record["place_on"], record["set"]) == ("trunk_head", "pelvis", ("trunk_head", "pelvis"))

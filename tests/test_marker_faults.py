@@ -14,7 +14,7 @@ from biodance.effects._base.quality_check import Recorded
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import MarkerFault, faulty_markers, without_faults
 from biodance.lab.prepare import prepare
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine

@@ -12,7 +12,7 @@ from standing_markers import OWN, stand
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.upright import axis_to_head
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.lab.session.read import dress
 from biodance.records import Markers, Source, Trial
 

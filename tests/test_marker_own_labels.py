@@ -16,7 +16,7 @@ from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.sets import LANDMARKS, MARKED_SEGMENTS, read_marker_set, segment_of
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
 from biodance.observations import recording

@@ -12,8 +12,8 @@ from biodance import read_session, scale
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.markers.signals import fill_gaps
-from biodance.lab.opensim_tables import read_mot, write_mot
 from biodance.lab.prepare import prepare
+from biodance.lab.program_tables import read_mot, write_mot
 from biodance.motion.track import track
 from biodance.pipeline.program_folders import opensim_coordinates, state_notes
 from biodance.records import AngleState, Markers, Motion, Trial

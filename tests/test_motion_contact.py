@@ -71,6 +71,29 @@ def test_a_foot_half_on_the_edge_is_not_measured(heel: float, measured: bool) ->
     assert any(said in note for note in contact.notes) != measured
 
 
+@pytest.mark.parametrize(
+    ("moved", "bears", "seated"),
+    [((0.0, 0.0, 0.10), 1.0, True), ((0.0, 0.0, 0.10), 0.8, False), ((0.0, 0.0, 0.0), 1.0, False),
+     ((-0.4, 0.0, 0.10), 1.0, False)],
+    ids=["feet hang", "something else carries, too", "feet are down", "the load is under the feet"],
+)  # fmt: skip
+def test_who_sits_on_the_plate_is_fully_measured(moved: tuple, bears: float, seated: bool) -> None:
+    plates = [plate("plate1", (-0.6, 0.4), (-0.3, 0.3))]
+    trial, soles, *_ = walker([Stand(0, 2, (-0.1, -0.1, 0))], [Stand(0, 2, (-0.1, 0.1, 0))], plates, duration=2.0)
+    value, ahead = bears * trial.plates[0].wrench.value, np.array([0.5, 0.0, 0.0])
+    there = replace(trial, plates=(replace(trial.plates[0], wrench=Wrench(soles.time, value)),))
+    feet = Soles(soles.time, soles.outline + ahead + moved)
+    contact = ground_contact(there, feet, mass=MASS)
+    assert contact.seated.all() == contact.seated.any() == seated
+    assert contact.measured.all() == (seated or moved[0] < 0)
+    if seated:
+        assert not contact.touching.any()
+        assert contact.told.all()
+        assert any("sits on something that stands on the plates in 201 of 201 frames" in one for one in contact.notes)
+        assert all(not one.value.any() for one in foot_wrenches(there, contact, feet).values())
+    assert not ground_contact(there, feet).seated.any()  # of unknown weight
+
+
 def on_a_belt(speed: float) -> tuple:
     """Return a walk over one long plate, everything carried backwards by its belt at ``speed`` m/s."""
     long = [plate("plate1", (-3.0, 6.0), (-0.3, 0.3))]
@@ -339,7 +362,7 @@ def test_the_soles_of_a_tracked_body_serve_as_well() -> None:
 )
 def test_real_trials(file: str, mass: float, least: int, data: Path) -> None:
     from biodance.lab.prepare import prepare
-    from biodance.lab.read import read_trial
+    from biodance.lab.readers import read_trial
 
     trial = prepare(read_trial(data / file))
     assert trial.markers is not None

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
-from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.similarity import SimilarityScale, hoap3, similar_body, standing_frames
+from biodance.body.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import GeneralLeg, Leg
 from biodance.motion.kinematics import poses

@@ -19,9 +19,8 @@ from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.recording.laboratory import Laboratory
-from biodance.virtual_lab.recording.visit import LabVisit, perform_in, set_up
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import Laboratory, LabVisit, perform_in, set_up
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
 LEFT_LEG = ("LTHI", "LKNE", "LTIB", "LANK", "LHEE", "LTOE")

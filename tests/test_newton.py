@@ -15,7 +15,7 @@ from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
 from biodance.observations import observe, recording
-from biodance.pipeline.checks import WeighedBy, weigh, with_weighed_mass
+from biodance.pipeline.identification import WeighedBy, weigh, with_weighed_mass
 from biodance.records import Session, Wrench
 
 CLEAN = {

@@ -15,7 +15,7 @@ from biodance.observations.stride_force import StrideForce
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Wrench
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 
 def spoiled(session: Path, folder: Path, text: str) -> Path:

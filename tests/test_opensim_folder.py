@@ -7,7 +7,7 @@ import pytest
 from squatting import BODY, squat
 
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.lab.opensim_tables import read_mot
+from biodance.lab.program_tables import read_mot
 from biodance.lab.readers.mot import plates_of
 from biodance.pipeline.program_folders import write_opensim_folder
 from biodance.pipeline.trial_result import TrialResult

@@ -12,12 +12,12 @@ import pytest
 from biodance.body.body import Body, body_text, parse_body
 from biodance.body.changes import parts_as_segments
 from biodance.body.human.human import human
-from biodance.body.human.optional_joints import OPTIONAL_JOINTS, marker_groups, with_optional
-from biodance.body.inertia import RigidInertia, inertial_parameters, shift_matter, smallest_eigenvalues
+from biodance.body.human.skeleton import OPTIONAL_JOINTS, marker_groups, with_optional
+from biodance.body.parts import RigidInertia, inertial_parameters, shift_matter, smallest_eigenvalues
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import joint_torques, predict_wrench
+from biodance.motion.ik.functional_joints import NEED, with_shown_joints
 from biodance.motion.kinematics import poses
-from biodance.motion.optional_joints import NEED, with_shown_joints
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Sip, Source, Subject, Trial
 from biodance.settings import Settings

@@ -16,17 +16,16 @@ from small_dances import small_dance
 
 import biodance
 from benchmarks.plates import Step, draw
-from biodance.batch.outcome import Outcome
 from biodance.batch.summary import write_summary
-from biodance.batch.work import trial_rows
+from biodance.batch.work import Outcome, trial_rows
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
 from biodance.dance.problem.plan import read_plan
 from biodance.diagnosis.archive.judge import judge_archive
 from biodance.lab.session.read import read_session
-from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.dance import DanceResult
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.plates import PlatesJudged
+from biodance.pipeline.laboratory import PlatesJudged
 from biodance.pipeline.session import examine
 from biodance.report.dance import cards_page
 from biodance.report.pages.feedback import write_feedback

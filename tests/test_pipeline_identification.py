@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from identified_sessions import body, session_result, truth
 
+from biodance.display import spaced
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.identification import can_identify, identify_trials
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.session import identification_of
 from biodance.records import Plate, Wrench
 from biodance.report.pages.identification import identification_section
@@ -60,7 +61,7 @@ def test_the_document_has_the_keys_that_programs_rely_on(numbers, found):
 
 
 def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
-    from biodance.body.inertia import rigid_inertia
+    from biodance.body.parts import rigid_inertia
 
     lump = rigid_inertia(found.identification.sip.of("left_thigh"))
     row = numbers["segments"][body().segment_index("left_thigh")]
@@ -120,7 +121,7 @@ def test_nothing_to_fit_is_refused_with_what_to_do():
 
 def test_the_section_shows_every_segment(found):
     text = identification_section(found)
-    assert all(f'<th scope="row">{name.replace("_", " ")}</th>' in text for name in body().segments)
+    assert all(f'<th scope="row">{spaced(name)}</th>' in text for name in body().segments)
     assert text.count('class="panel"') == 8  # masses (heavy, light), centres and inertias along three axes
     for word in ("validate_1", "From the data", "cannot be known", "No load is found beyond the table"):
         assert word in text
@@ -140,7 +141,7 @@ def test_the_report_holds_identification_where_there_is_one(roles, monkeypatch):
 def test_a_load_on_the_page_has_segment_size_and_interval():
     text = identification_section(session_result(load=2.4, seed=5).identification)
     assert "Beyond the table the subject carries 2." in text
-    assert "kg on the left forearm hand (95 % interval" in text
+    assert "kg on the left forearm with hand (95 % interval" in text
 
 
 def test_joint_torques_of_the_kept_trial_are_told_with_their_band():

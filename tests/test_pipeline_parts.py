@@ -13,9 +13,9 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.signals import MarkerGaps
 from biodance.lab.markers.upright import quiet_run
 from biodance.motion.kinematics import centre_of_mass, poses
-from biodance.motion.quiet_standing import QuietStanding, facing, quiet_standing
-from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.still import bone_lines
+from biodance.motion.newton import QuietStanding, facing, quiet_standing
+from biodance.pipeline.identification import mass_check, standing_check, trial_checks
+from biodance.pipeline.scenes import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WeighedBy, Weighing
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench

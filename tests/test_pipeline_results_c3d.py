@@ -13,8 +13,8 @@ from biodance.lab.c3d.raw import read_raw
 from biodance.lab.session.read import read_session
 from biodance.motion.contact import foot_wrenches, ground_contact
 from biodance.motion.soles import soles_from_body
+from biodance.pipeline.export import results_into_c3d
 from biodance.pipeline.session import examine
-from biodance.pipeline.trial_files import results_into_c3d
 from biodance.records import Subject
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.simulate import simulate_session

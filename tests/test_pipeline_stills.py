@@ -17,8 +17,7 @@ from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.pipeline.session_frames import frames_of
-from biodance.pipeline.still import load_still, posture_still, worst_still
+from biodance.pipeline.scenes import frames_of, load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.records.motion import BY_FRAME
 from biodance.report.figures import solid
@@ -87,7 +86,7 @@ def test_a_load_is_drawn_where_it_sits(result):
     np.testing.assert_allclose(still.load, pose.points([segment], place[None])[0, 0], atol=1e-12)
     low, high = best.interval
     assert still.about == (
-        "The load that was found (yellow): 2.00 kg on the left forearm hand "
+        "The load that was found (yellow): 2.00 kg on the left forearm with hand "
         f"(95 % interval {low:.2f} to {high:.2f} kg; probability of no load below 0.001)."
     )
     unplaced = replace(best, place=np.full(3, np.nan))
@@ -171,7 +170,7 @@ def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
 
 
 def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypatch):
-    monkeypatch.setattr("biodance.pipeline.session_frames._FRAMES", 40)
+    monkeypatch.setattr("biodance.pipeline.scenes._FRAMES", 40)
     search, place = result.identification.search, np.array([0.0, -0.2, 0.02])
     best = replace(search.best, segment="left_forearm_hand", place=place)
     found = replace(result.identification, search=replace(search, suspects=(best, *search.suspects[1:])))

@@ -9,7 +9,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 FAULT = "plate_gain:target=plate1:Fz,gain=0.08"
 

@@ -158,3 +158,16 @@ def test_knee_and_hip_of_five_real_walks_are_within_two_degrees_of_plug_in_gait(
     assert {one.because.value for one in moved.gait.left_out} == {"shared_plate"}
     loads = next(one for one in moved.gait.groups if (one.quantity, one.side) == ("hip_flexion_moment", "right"))
     assert np.nanmax(np.abs(loads.values)) < 2.0  # N·m/kg: no spikes from the shares of a plate under both feet
+
+
+@pytest.mark.parametrize("child", ["HC050A", "HC055A"])
+def test_a_child_bends_the_knee_more_in_swing_than_plug_in_gait_says(child: str, recording: Recording) -> None:
+    """Its knee goes with one marker, which slides backwards (docs/benchmarks/movement.md)."""
+    moved = describe_movement(recording(f"biomechzoo/{child}"))
+    assert moved.gait is not None
+    (knee,) = [one for one in moved.gait.keys if one.name == "knee_flexion_maximum"]
+    for side, ours in (("right", knee.right), ("left", knee.left)):
+        assert ours is not None
+        assert 1.5 < ours.mean - knee.beside[side].mean < 4.5
+    muscles = {(one.quantity, one.side) for one in moved.gait.groups if one.quantity.endswith("_emg")}
+    assert ("gastrocnemius_emg", "left") in muscles

@@ -15,7 +15,7 @@ import biodance
 from biodance.cli import run
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.c3d.write import write_c3d
-from biodance.lab.opensim_tables import write_mot
+from biodance.lab.program_tables import write_mot
 from biodance.lab.session.write import write_registered
 from biodance.records import Markers, Plate, Subject, Wrench
 

@@ -18,7 +18,7 @@ from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, told_together
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section

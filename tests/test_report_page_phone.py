@@ -5,8 +5,8 @@ from browser import BROWSER, Page
 from example_results import full_session, html_of
 from identified_sessions import session_result
 
-from biodance.batch.outcome import Outcome
 from biodance.batch.summary import write_summary
+from biodance.batch.work import Outcome
 
 _WIDER = """[...document.querySelectorAll('html, .wide, .wide *')].filter(one => one.clientWidth > 0
   && one.scrollWidth > one.clientWidth + 1).map(one => one.tagName + ' ' + one.innerText.slice(0, 60))"""

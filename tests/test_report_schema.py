@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from example_results import full_session, refused_session
 
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.saved_results import provenance
 from biodance.report.pages.template import html_table
 from biodance.report.tables.schema import Schema, markdown_table, plain_values, shown, to_text
 from biodance.report.tables.session import results_document
@@ -63,7 +63,7 @@ def test_several_are_rows_in_order_and_say_what_they_are_about():
 
 def test_page_terminal_and_markdown_show_the_same_cells():
     row = ROW.row(BAG)
-    cells = ["left forearm hand", "2.4", "2.00 kg", "–", "3, 2"]
+    cells = ["left forearm with hand", "2.4", "2.00 kg", "–", "3, 2"]
     assert ROW.cells(row) == cells
     assert markdown_table(ROW, [row]).splitlines()[2] == f"| {' | '.join(cells)} |"
     page = html_table(ROW, [row | {"segment": "<b>"}], "a < b", only=("segment", "mass (kg)"))

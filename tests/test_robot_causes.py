@@ -13,15 +13,15 @@ from robot_lab import RobotLab, write_robot_trial
 from robot_recordings import FEET, RATE, SOLE_OVER_ANKLE, danced, drawing, real_robot
 
 from biodance.body.body import Body
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.urdf import read_urdf
 from biodance.diagnosis.robot import robot_causes
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.robot import RobotMotion, robot_fit
 from biodance.lab.robot import read_robot_recording
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.grounded import PlateFit, base_of_markers, from_plate, ground
+from biodance.pipeline.robot import cause_words
 from biodance.pipeline.robot_trials import bring_together
-from biodance.pipeline.robot_words import cause_words
 from biodance.records import Array, Markers
 
 _SECONDS, _STEP = 16.0, 2

@@ -8,12 +8,11 @@ import pandas as pd
 import pytest
 from robot_recordings import FEET, drawing, matched, recorded
 
-from biodance.body.robot.urdf import read_urdf
+from biodance.body.urdf import read_urdf
 from biodance.errors import BiodanceError
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.motion.grounded import onto_plate
-from biodance.pipeline.robot import identify_robot
-from biodance.pipeline.robot_words import of_file
+from biodance.pipeline.robot import identify_robot, of_file
 from biodance.records import CHANNELS
 from biodance.spatial import wrench_about_point
 

@@ -17,8 +17,7 @@ from robot_recordings import COVER, FEET, drawing, matched, real_robot, recorded
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.motion.grounded import PlateFit, fit_plate, from_plate, onto_plate
-from biodance.pipeline.robot import identify_robot
-from biodance.pipeline.robot_words import attention_of
+from biodance.pipeline.robot import attention_of, identify_robot
 from biodance.records import Wrench
 
 

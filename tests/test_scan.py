@@ -9,7 +9,7 @@ import trimesh
 from scanned_people import ScannedPerson, measured_skeleton, scanned_person
 from trimesh.triangles import mass_properties
 
-from biodance.body.human.prior import prior
+from biodance.body.human.human import prior
 from biodance.body.human.scan import clip_surface, cut_scan, cut_section, read_scan
 from biodance.body.human.skeleton import SEGMENTS
 from biodance.body.tables.choice import reference

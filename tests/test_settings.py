@@ -15,8 +15,8 @@ from biodance.lab.prepare import LowPass, force_filter, low_pass, motion_filter,
 from biodance.lab.session.file import read_session_file
 from biodance.motion.contact import ground_contact
 from biodance.motion.soles import soles_from_body
-from biodance.pipeline.checks import trial_checks
-from biodance.pipeline.provenance import provenance
+from biodance.pipeline.identification import trial_checks
+from biodance.pipeline.saved_results import provenance
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.settings import USUAL, ContactRules, Settings, assignments
 from biodance.virtual_lab.simulate import simulate_session

@@ -1,6 +1,9 @@
-"""The subject's page in other languages: every sentence in every catalogue, and a laboratory's own catalogue."""
+"""Pages in other languages (the subject's, the cards and the page of a dance): every sentence in every catalogue, and a
+laboratory's own catalogue.
+"""
 
 import re
+import tomllib
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -14,8 +17,11 @@ from made_cycles import walked_knees
 
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
+from biodance.dance.problem.plan import read_plan
+from biodance.dance.search.known_postures import IN_PART, posture_phrases
 from biodance.errors import FileRefused, UnknownName
 from biodance.lab.session.file import VisitEntry
+from biodance.library import folder, names
 from biodance.pipeline.for_subject import SubjectAccount, account_for
 from biodance.report.pages.language import FAMILY, read_language
 from biodance.report.pages.subject import subject_page
@@ -26,13 +32,26 @@ WRITTEN = (
     (REPORT / "pages" / "subject_movement.py", "python"),
     (REPORT / "templates" / "subject.html.j2", "jinja2"),
 )
+DANCED = (
+    (REPORT.parent / "dance" / "cues.py", "python"),
+    (REPORT / "dance.py", "python"),
+    (REPORT / "pages" / "dance_words.py", "python"),
+    (REPORT / "pages" / "feedback.py", "python"),
+    *((REPORT / "templates" / f"{name}.html.j2", "jinja2") for name in ("cues", "feedback")),
+    *((REPORT / "templates" / f"{name}.js", "javascript") for name in ("feedback", "follow", "visit")),
+)
 KEYWORDS = {"say": None, "N_": None, "count": (1, 2)}
 
 
 def sentences() -> set[str]:
-    """Return what the page's code says, a singular for both numbers."""
-    found = [one[1] for path, method in WRITTEN for one in extract_from_file(method, path, keywords=KEYWORDS)]
-    return {one if isinstance(one, str) else one[0] for one in found}
+    """Return what the pages' code says, a singular for both numbers, and the words and care of shipped protocols."""
+    written = (*WRITTEN, *DANCED)
+    found = [one[1] for path, method in written for one in extract_from_file(method, path, keywords=KEYWORDS)]
+    code = {one if isinstance(one, str) else one[0] for one in found}
+    cues = tomllib.loads((folder("protocols") / "vocabulary" / "cues.toml").read_text(encoding="utf-8"))
+    words = {one for group in cues.values() for _, *texts in group.values() for one in texts}
+    care = {one for name in names("protocols/dances") for one in read_plan(name).care}
+    return code | words | care | {*posture_phrases(), IN_PART}
 
 
 def catalogue(language: str) -> Catalog:
@@ -118,3 +137,9 @@ def test_a_catalogue_of_ones_own_is_taken_or_refused_with_what_is_wrong(tmp_path
     with pytest.raises(FileRefused, match=said) as refused:
         read_language(own)
     assert str(refused.value).count("ours.po") == 1
+
+
+def test_a_catalogue_that_loses_a_limb_is_refused(tmp_path):
+    (tmp_path / "fr.po").write_text(bracketed().replace("⟦lift {} forward⟧", "⟦lift forward⟧"), encoding="utf-8")
+    with pytest.raises(FileRefused, match=r"is to hold \{\}"):
+        read_language(tmp_path / "fr.po")

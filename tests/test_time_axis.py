@@ -10,7 +10,7 @@ from tables import jittering
 
 from biodance.errors import FileRefused
 from biodance.lab.markers.time_axis import time_axis
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.records import Trial
 
 

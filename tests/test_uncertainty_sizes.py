@@ -18,7 +18,7 @@ from biodance.diagnosis.problem import problem
 from biodance.effects import effect
 from biodance.errors import UnknownName
 from biodance.uncertainty.tolerances import BEFORE, in_state, key_of, table_sizes
-from biodance.virtual_lab.tolerances import REALISTIC
+from biodance.virtual_lab.person.skeleton import REALISTIC
 
 CALIBRATED = replace(body(), joint_errors=(JointError("right_knee", 0.006, 0.04), JointError("trunk", 0.013, 0.0)))
 TABLE = read_table("uncertainty", "sizes")
@@ -30,11 +30,11 @@ CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position",
 ELSEWHERE = {
     "body/human/scaling.py:_TILT": "deg, a warning's threshold",
     "body/human/skeleton.py:_HAND_TURN": "a joint's range",
-    "virtual_lab/recording/visit.py:tilt": "a fault that a visit is given, 0 by default",
-    "body/robot/similarity.py:_RELATIVE_MASS_SD": "robots: what a data sheet is worth",
-    "body/robot/similarity.py:_RELATIVE_INERTIA_SD": "robots",
-    "body/robot/similarity.py:_COM_SD": "robots",
-    "body/robot/hoap3.py:_COM_SD": "robots",
+    "virtual_lab/visit.py:tilt": "a fault that a visit is given, 0 by default",
+    "body/similarity.py:_RELATIVE_MASS_SD": "robots: what a data sheet is worth",
+    "body/similarity.py:_RELATIVE_INERTIA_SD": "robots",
+    "body/similarity.py:_COM_SD": "robots",
+    "body/similarity.py:_CENTRE_SD": "robots",
     "uncertainty/session_noise.py:_GAIN": "of a difference filter",
     "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",
 }

@@ -13,8 +13,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from biodance.body.changes import recentre_joint
-from biodance.body.inertia import rigid_inertia
-from biodance.body.parts import GRAVITY
+from biodance.body.parts import GRAVITY, rigid_inertia
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import chains, neighbours, poses
 from biodance.records import Array, Motion

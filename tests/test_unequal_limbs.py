@@ -26,8 +26,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.accepted import write_corrected
 from biodance.records import Motion
 from biodance.uncertainty.caution import widened_prior
-from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.person.prosthesis import with_prostheses
+from biodance.virtual_lab.person.person import make_person, with_prostheses
 
 TRIALS = ("static", *(f"move_{n}" for n in range(1, 9)), "squat_1")
 LESS = 2.0

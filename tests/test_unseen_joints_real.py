@@ -11,7 +11,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Session
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 
 LEGS = ("ASI", "PSI", "SACR", "THI", "KNE", "TIB", "ANK", "HEE", "TOE", "MMA", "KAX")
 

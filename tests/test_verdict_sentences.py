@@ -12,13 +12,13 @@ from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.repairs import with_failed
 from biodance.effects import QualityCheck
 from biodance.pipeline.attention import (
+    headline,
     identified_attention,
     is_well,
     reconcile_with_checks,
     session_attention,
 )
-from biodance.pipeline.checks import NOT_WEIGHED
-from biodance.pipeline.headline import headline
+from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.trial_result import Check, Step
 from biodance.pipeline.words import in_words
 from biodance.records.attention import Attention, Judged, strongest_first

@@ -15,16 +15,14 @@ from scipy.integrate import solve_ivp
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.faults.causes import CAUSES, Hidden, fault_of, hide, parse_cause
-from biodance.virtual_lab.faults.forces import Spring, swing
+from biodance.virtual_lab.causes import CAUSES, Hidden, Spring, fault_of, hide, parse_cause, swing
 from biodance.virtual_lab.movement.performance import perform
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.recording.laboratory import Laboratory
-from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.visit import FIRST_VISIT, Laboratory, LabVisit
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
 PERFECT = LabVisit(tolerances=PERFECT_INSTRUMENTS)

@@ -23,12 +23,11 @@ from biodance.dance.search.postures import KEPT, distance_from, initial_guess, s
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
-from biodance.pipeline.simulate_dance import simulate_dance, stretches
+from biodance.pipeline.front_dance import simulate_dance, stretches
 from biodance.records import SIDES, Subject
-from biodance.virtual_lab.movement.dancing import _JOINTS, PERFORMERS, Performer, copy_dance
-from biodance.virtual_lab.movement.performance import true_wrench
+from biodance.virtual_lab.movement.performance import _JOINTS, PERFORMERS, Performer, copy_dance, true_wrench
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.tolerances import PERFECT
+from biodance.virtual_lab.person.skeleton import PERFECT
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 BODY = replace(human(SUBJECT), limits=joint_limits(SUBJECT, within="comfortable"))
@@ -136,7 +135,62 @@ def test_what_cannot_be_copied_is_refused(dance: Dance) -> None:
         Performer(tracking=1.0)
     with pytest.raises(BiodanceError, match=r"timing = 0\.9"):
         Performer(timing=0.9)
-    stool = seat(BODY)
-    seated = replace(dance, stances=(stool,) * len(dance.stances), under=(stool,) * len(dance.under))
-    with pytest.raises(BiodanceError, match="virtual persons stand"):
-        stretches(seated)
+
+
+@pytest.fixture(scope="module")
+def seated() -> Dance:
+    """Return three postures on a stool: at rest, an arm and a shank lifted, both thighs off the seat."""
+    stool, x = seat(BODY), np.zeros((3, Chain(BODY).size))
+    place = {joint.name: 6 + j for j, joint in enumerate(BODY.joints)}
+    x[:, 2] = stool.seat
+    for side in SIDES:
+        x[:, place[f"{side}_hip_flexion"]] = np.radians([92.0, 92.0, 105.0])
+        x[:, place[f"{side}_knee_flexion"]] = np.radians(80.0)
+        x[:, place[f"{side}_shoulder_adduction"]] = np.radians([-20.0, -20.0, -60.0])
+    x[1, [place["right_shoulder_flexion"], place["left_knee_flexion"]]] = np.radians([70.0, 20.0])
+    via = x[:-1, None] + np.array([[0.21], [0.79]]) * np.diff(x, axis=0)[:, None]
+    hold, move, feet = np.full(3, 1.0), np.full(2, 2.0), (stool,) * 3
+    return Dance("test", BODY, x, feet, hold, via, move, feet[:2], 0)
+
+
+def test_who_sits_stays_on_the_seat_and_moves_as_planned(seated: Dance) -> None:
+    person, shown, done = copied(seated)
+    motion, seat_height = done.motion(shown.motion.time), seated.stances[0].seat
+    for name in (*_JOINTS["right_arm"], *_JOINTS["left_leg"]):
+        planned = shown.motion.q[:, 7 + shown.body.joint_index(name)]
+        np.testing.assert_allclose(motion.q[:, 7 + person.body.joint_index(name)], planned, atol=0.03)
+    hips = poses(person.body, motion.q).position[:, [person.body.segment_index(f"{side}_thigh") for side in SIDES]]
+    assert np.ptp(hips, axis=0).max() < 1e-9
+    np.testing.assert_allclose(hips[..., 2], seat_height, atol=1e-9)
+
+
+def test_who_sits_restlessly_rocks_within_the_stool_and_sinks_no_thigh_into_it(seated: Dance) -> None:
+    person, (shown,) = make_person(SUBJECT, 3), stretches(seated)
+    done = copy_dance(person, shown, 0, centre=np.array([1.0, 0.0]), performer=PERFORMERS["restless"])
+    motion = done.motion(np.arange(0.0, done.plan.duration, 0.05))
+    pose = poses(person.body, motion.q)
+    hips, knees = (
+        pose.position[:, [person.body.segment_index(f"{side}_{part}") for side in SIDES]] for part in ("thigh", "shank")
+    )
+    assert 0.001 < np.ptp(hips.mean(axis=1), axis=0).max() < 0.03
+    assert (hips[..., 2] - knees[..., 2]).max() < 0.04
+    wrench = done.wrench(motion.time)
+    pressure = wrench.cop()[:, :2] - [1.0, 0.0]
+    assert np.abs(pressure).max() < 0.2
+    assert wrench.force[:, 2].mean() == pytest.approx(9.80665 * person.mass, rel=0.01)
+    parts = [done.foot_wrench(motion.time, side) for side in SIDES]
+    np.testing.assert_allclose(sum(parts), wrench.value, atol=1e-6)
+
+
+def test_a_session_on_the_stool_has_a_seated_static_trial_and_a_second_round(seated: Dance, tmp_path: Path) -> None:
+    folder = simulate_dance(SUBJECT, seated, tmp_path / "session", seed=3)
+    session = read_session(folder)
+    assert {trial.name: trial.role for trial in session.trials} == {
+        "static": "static",
+        "dance_1": "fit",
+        "again_dance_1": "validate",
+    }
+    assert not any("from the feet that the markers show" in text for trial in session.trials for text in trial.warnings)
+    height = {name: session["static"].markers.xyz[:, k, 2] for k, name in enumerate(session["static"].markers.names)}
+    assert np.ptp(height["RASI"]) < 0.01
+    assert abs(np.mean(height["RKNE"]) - seated.stances[0].seat) < 0.06  # markers were glued on the bent knee

@@ -19,7 +19,7 @@ from biodance.observations import observe
 from biodance.observations._recording import recording
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.causes import fault_of, parse_cause
 from biodance.virtual_lab.movement.gait import GaitPerformance, perform_gait
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person

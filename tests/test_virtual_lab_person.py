@@ -8,6 +8,7 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
+from biodance.virtual_lab.instruments import reference_angles
 from biodance.virtual_lab.person.person import (
     AddedLoad,
     make_person,
@@ -16,9 +17,7 @@ from biodance.virtual_lab.person.person import (
     place_inertia,
     true_pseudo_inertia,
 )
-from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
-from biodance.virtual_lab.recording.instruments import reference_angles
-from biodance.virtual_lab.tolerances import PERFECT
+from biodance.virtual_lab.person.skeleton import PERFECT, TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
 from biodance.virtual_lab.truth import MERGED, load_on, merged_sip, place_in_12
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]

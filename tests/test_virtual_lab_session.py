@@ -16,22 +16,24 @@ from biodance.lab.readers.c3d import read_c3d
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
+from biodance.virtual_lab.instruments import TISSUES
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, make_person, of_parameters, place_inertia
-from biodance.virtual_lab.person.skeleton import small_rotation
-from biodance.virtual_lab.recording.instruments import TISSUES
-from biodance.virtual_lab.recording.laboratory import (
+from biodance.virtual_lab.person.skeleton import REALISTIC, small_rotation
+from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.truth import sip_in_frames
+from biodance.virtual_lab.visit import (
     CAMERAS,
     PLATES,
     Laboratory,
+    LabVisit,
     draw_laboratory,
     draw_visitor,
+    perform_in,
+    record,
+    set_up,
     soft_parts,
 )
-from biodance.virtual_lab.recording.visit import LabVisit, perform_in, record, set_up
-from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.tolerances import REALISTIC
-from biodance.virtual_lab.truth import sip_in_frames
 
 SUBJECT = Subject(58.0, 1.66, "F", 28.0, "S07")
 FAITHFUL = PERFECT_INSTRUMENTS
@@ -245,7 +247,7 @@ TESTED = (
     "biodance.motion.dynamics",
     "biodance.motion.ik.inverse_kinematics",
     "biodance.body.tables.anthropometry",
-    "biodance.body.human.prior",
+    "biodance.body.human.human",
 )
 """What sessions of the virtual laboratory test: a formula that maker and finder share would hide its own bug."""
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.sessions import SessionPlace
-from biodance.batch.outcome import TABLES
 from biodance.batch.summary import folder_name
+from biodance.batch.work import TABLES
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.plain_text import for_spreadsheet
@@ -41,7 +41,7 @@ EXPORTS: Mapping[str, str] = {
 """Formats that are offered, and the ending of their file; "" = a folder, handed out as .zip."""
 _OF_TRIALS = ("c3d", "trc", "mot")
 _SHOWN = ("attention", "judged", "checks", "subject", "mass_check", "refused", "steps")
-_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice")
+_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice", "session_entry")
 
 
 def read_results(place: SessionPlace) -> dict[str, Any]:

@@ -1,5 +1,5 @@
-"""What acceptance changes of a session's residuals, in a process of its own: ``python -m biodance.app.residuals SESSION
-ACCEPTED`` prints it as JSON.
+"""What plates and simulation of a session differ by before and after something is corrected, in a process of its own:
+``python -m biodance.app.residuals SESSION ACCEPTED`` prints it as JSON.
 """
 
 import json
@@ -9,27 +9,31 @@ from typing import Any
 
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import CORRECTED
+from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.report.tables.schema import plain_values
 
 
-def residual_rows(session: Path, accepted: Path) -> list[dict[str, Any]]:
-    """Return by ``trial`` the RMS (6) N, N·m of measured less simulated wrench, with the table's body: ``before``, of
-    the session as recorded, and ``after``, of the trials corrected in the folder of what was ``accepted``; () where
-    no trial was corrected.
+def residual_rows(before: SessionResult, after: SessionResult) -> list[dict[str, Any]]:
+    """Return by ``trial`` the RMS of a session ``before`` and ``after`` a correction, each a list: the six channels of
+    measured less simulated wrench (N, N·m; the table's body), and the distance of the markers from the body (mm); None
+    = not known.
     """
-    corrected = accepted / CORRECTED
-    if not corrected.is_dir():
-        return []
-    before, after = _rms(session), _rms(corrected)
-    return [{"trial": name, "before": rms, "after": after[name]} for name, rms in before.items() if name in after]
+    rows, later = _rms(before), _rms(after)
+    return [{"trial": name, "before": rms, "after": later[name]} for name, rms in rows.items() if name in later]
 
 
-def _rms(folder: Path) -> dict[str, list[float]]:
-    result = examine(read_session(folder))
-    compared = {one.name: one.comparison for one in result.trials if one.comparison and one.comparison.used.any()}
-    return {name: comparison.rms.tolist() for name, comparison in compared.items()}
+def _rms(result: SessionResult) -> dict[str, list[float | None]]:
+    found: dict[str, list[float | None]] = {}
+    for one in result.trials:
+        compared = one.comparison is not None and one.comparison.used.any()
+        wrench = one.comparison.rms.tolist() if compared and one.comparison else [None] * 6
+        if compared or one.fit:
+            found[one.name] = [*wrench, 1000 * one.fit.total_rms if one.fit else None]
+    return found
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(plain_values(residual_rows(Path(sys.argv[1]), Path(sys.argv[2])))))
+    corrected = Path(sys.argv[2]) / CORRECTED
+    pair = [examine(read_session(folder)) for folder in (Path(sys.argv[1]), corrected)] if corrected.is_dir() else []
+    sys.stdout.write(json.dumps(plain_values(residual_rows(*pair) if pair else [])))

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.sessions import Archive, SessionPlace
-from biodance.batch.engines import Work, run_here
-from biodance.batch.run import Ledger, told_of_book
+from biodance.batch.run import Ledger, Work, run_here, told_of_book
 from biodance.batch.summary import SESSIONS
 from biodance.batch.work import PART, process_session
 from biodance.errors import BiodanceError

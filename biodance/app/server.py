@@ -23,7 +23,7 @@ from biodance.app.edits import ChangedElsewhereError
 from biodance.app.guard import LARGEST_BODY, LoopbackGuard
 from biodance.app.sessions import Archive
 from biodance.app.window import Asked, Window
-from biodance.batch.engines import prepare_workers
+from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
 from biodance.report.pages.template import three_js
 
@@ -58,6 +58,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         window.results,
         window.strides,
         window.folders,
+        window.form,
     )
     writes = (
         window.edit,
@@ -66,9 +67,11 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         window.redo,
         window.run,
         window.stop,
+        window.correction,
         window.accept,
         window.keep,
         window.open,
+        window.limits,
     )
     routes = [
         Route("/", static),

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.edits import SessionText
-from biodance.batch.outcome import OUTCOME, TABLES, SessionTask, fingerprint_of
 from biodance.batch.run import Ledger, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
+from biodance.batch.work import OUTCOME, TABLES, SessionTask, fingerprint_of
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.session.archive import archive_folders, visit_date
 from biodance.library import parse_json

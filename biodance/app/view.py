@@ -16,8 +16,8 @@ from biodance.lab.markers.names import meanings_of, plain_labels
 from biodance.lab.markers.sets import GUESSED, LANDMARKS, MARKED_SEGMENTS, MarkerSet, read_marker_set
 from biodance.lab.markers.signals import report_gaps
 from biodance.lab.markers.upright import is_still, movement
+from biodance.lab.session.entries import plate_channels
 from biodance.lab.session.file import SessionFile, read_session_file
-from biodance.lab.session.plate_entry import plate_channels
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
 from biodance.records import ROLES, FootEvent, Markers, Plate, Session, Trial

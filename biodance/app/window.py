@@ -1,5 +1,6 @@
 """What the pages of a window ask for, each question a method; how they are asked is `server`'s."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from starlette.responses import Response
 
 from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
 from biodance.app.folders import allowed_folder, folders_document
+from biodance.app.limits import limits_form, limits_text
 from biodance.app.outputs import (
     csv_archive,
     exported,
@@ -149,7 +151,9 @@ class Window:
         return Response(text, media_type="text/html", headers={"Content-Security-Policy": _SANDBOX})
 
     def download(self, asked: Asked) -> Response:
-        """Return the results in a format: a file of theirs, all tables, or for another program."""
+        """Return the results in a format: a file, all tables, for another program; or a person's limits."""
+        if asked.text("format") == "limits":
+            return _attached("person.toml", self.limits(asked)["text"].encode())
         place, kind = self._place(asked), asked.text("format")
         stem = place.folder.resolve().name
         if kind == "file":
@@ -161,6 +165,31 @@ class Window:
             if kind == "csv":
                 return _attached(f"{stem}_tables.zip", csv_archive(place))
             return _attached(*exported(place, kind, asked.text("trial")))
+
+    def correction(self, asked: Asked) -> dict[str, Any]:
+        """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
+        place, wanted = self._place(asked), asked.body.get("findings")
+        found = (read_results(place)["diagnosis"] or {}).get("findings", [])
+        able = {f"{one['effect']} {one['target']}": one for one in found if one.get("session_entry")}
+        if not isinstance(wanted, list) or not wanted or not set(wanted) <= able.keys():
+            raise BiodanceError(f"findings must be some that session.toml can correct: {', '.join(able) or 'none is'}.")
+        keys = ("target", "trials", "parameters", "session_entry")
+        asked_of = [{key: able[name][key] for key in keys} for name in wanted]
+        with self._one_export:
+            return dict(
+                parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))
+            )
+
+    def form(self, _: Asked) -> dict[str, Any]:
+        """Return what the form for a person's limits asks."""
+        return limits_form()
+
+    def limits(self, asked: Asked) -> dict[str, str]:
+        """Return the file of what was filled into the form for a person's limits."""
+        values = parse_json(asked.text("values"))
+        if not isinstance(values, dict):
+            raise BiodanceError(f"values = {values!r} is no JSON object.")
+        return {"text": limits_text(asked.text("template"), values)}
 
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""

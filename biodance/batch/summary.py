@@ -8,8 +8,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from biodance.batch.outcome import Outcome
-from biodance.batch.work import ROW_TYPES
+from biodance.batch.work import ROW_TYPES, Outcome
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.lab.plain_text import whole_file
@@ -150,7 +149,7 @@ def _page(
     """Return the page of an archive as HTML text."""
     from markupsafe import Markup
 
-    from biodance.pipeline.provenance import now
+    from biodance.pipeline.saved_results import now
     from biodance.report.figures.style import svg_address
     from biodance.report.pages.template import print_sheet, render, template_text
     from biodance.report.wording import moment, signed

@@ -7,15 +7,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import (
+from biodance.body.parts import (
     PSEUDO_INERTIA,
+    Joint,
+    JointLimits,
+    Part,
     RigidInertia,
+    SegmentMarkers,
     inertial_parameters,
     pseudo_inertia,
     shift_matter,
     smallest_eigenvalues,
 )
-from biodance.body.parts import Joint, JointLimits, Part, SegmentMarkers
 from biodance.records import Array, Sip
 
 

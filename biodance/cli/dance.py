@@ -43,6 +43,11 @@ DespiteOption = Annotated[
 ]
 
 
+LanguageOption = Annotated[
+    str, Parameter(help="Language of cards and page: en, de, or the path of a catalogue of your own (*.po).")
+]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class DanceAsked:
@@ -84,6 +89,7 @@ def dance_command(
         ),
     ] = 0,
     despite: DespiteOption = False,
+    language: LanguageOption = "en",
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -99,9 +105,11 @@ def dance_command(
     from biodance.lab.session.results_folder import whole_folder
     from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance, robot_dancer
     from biodance.report.dance import print_dance, write_dance
+    from biodance.report.pages.language import read_language
 
     if robot.given and asked.plate is not None:
         raise BiodanceError("--plate is for people: a robot's feet stand as far apart as its hips. Leave it out.")
+    read_language(language)  # what is wrong with it is said before the long work starts
     plan, able = asked.plan(), read_person(asked.limits) if asked.limits else HEALTHY
     who = _who(person, robot)
     if isinstance(who, RobotFile):
@@ -118,7 +126,7 @@ def dance_command(
             return STOPPED
         tell("writing", 0, 0)
         with whole_folder(folder, over=True) as part:
-            found = write_dance(result, part, despite=despite)
+            found = write_dance(result, part, despite=despite, language=language)
     show(found, print_dance, json=json, path=folder)
     if result.dance is not None and result.dance.unsafe and not despite:
         say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
@@ -151,7 +159,14 @@ def limits_command(
 
 
 @app.command(name="feedback")
-def feedback_command(dance: Path, *, despite: DespiteOption = False, out: FileOut, force: ForceOption = False) -> int:
+def feedback_command(
+    dance: Path,
+    *,
+    despite: DespiteOption = False,
+    language: LanguageOption = "en",
+    out: FileOut,
+    force: ForceOption = False,
+) -> int:
     """Write a page that guides a person through a dance: one HTML file that opens in a browser without a network.
 
     It shows the person's own body, the next posture as a light figure, what to move, and a countdown with sound;
@@ -167,7 +182,7 @@ def feedback_command(dance: Path, *, despite: DespiteOption = False, out: FileOu
     from biodance.dance.dance import Dance
     from biodance.report.pages.feedback import write_feedback
 
-    if not write_feedback(Dance.load(dance), out, force=force, despite=despite):
+    if not write_feedback(Dance.load(dance), out, force=force, despite=despite, language=language):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     show_place(out)
     return DONE

@@ -57,7 +57,7 @@ def register_command(
     forces
         Force file with unknown clock and unknown plate positions.
     """
-    from biodance.pipeline.registration import register
+    from biodance.pipeline.front import register
 
     with progress() as tell:
         found = register(markers, forces, out, rough=rough, force=force, tell=tell)

@@ -25,6 +25,8 @@ _PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
 """Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
 sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
 """
+EMG = "_emg"
+"""Ending of a quantity that is the activity of a muscle."""
 _AGAINST_LAB = ("PelvisAngles", "FootProgressAngles")
 """What plug-in gait tells against the laboratory's axes."""
 _OBLIQUE = 6.0  # deg
@@ -57,6 +59,14 @@ class EventComparison:
     sd: float
     count: int
     missed: int
+
+
+def emg_curves(cycle: Cycle, outputs: FileOutputs) -> Iterator[CycleCurve]:
+    """Yield the envelopes of a cycle's own leg, of both in a squat, a rise or a jump, as ``soleus_emg``."""
+    for one in outputs.emg:
+        inside = one.time[0] <= cycle.start and cycle.end <= one.time[-1]
+        if inside and cycle.side in (one.side, "both"):
+            yield over_cycle(cycle, f"{one.muscle}{EMG}", one.side, one.unit, one.time, one.value)
 
 
 def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:

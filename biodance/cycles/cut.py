@@ -21,7 +21,7 @@ from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion,
 # ground's speed under the pelvis. Ahead is where the pelvis faces in that frame, so that turns and treadmills are
 # walked, too. The body follows the markers, so that a marker that is lost for a moment costs no event.
 
-_THRESHOLD = 20.0
+FORCE_DOWN = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
 the same).
 """
@@ -31,7 +31,7 @@ _SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
 def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
     """Return when each foot came down on a plate or left it, in the order of time.
 
-    ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `_THRESHOLD`,
+    ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `FORCE_DOWN`,
     between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
     plate: a force that two feet share tells nothing of one.
     """
@@ -41,11 +41,11 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
         shortest = _SHORTEST * wrench.rate
-        loaded = _without_short(np.nan_to_num(force) > _THRESHOLD, shortest)
+        loaded = _without_short(np.nan_to_num(force) > FORCE_DOWN, shortest)
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):
                 continue
-            share = (_THRESHOLD - force[i]) / (force[i + 1] - force[i])
+            share = (FORCE_DOWN - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
             events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
     return tuple(sorted(events, key=lambda event: event.time))
@@ -164,7 +164,7 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
     return times
 
 
-_CycleKind = Literal["gait", "squat", "sit_to_stand"]
+_CycleKind = Literal["gait", "squat", "sit_to_stand", "jump"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5  # s of a gait cycle
@@ -174,13 +174,14 @@ _SEATED = 0.03
 """m that the centre of mass lies behind the heels of somebody who sits: standing so, one falls."""
 _MOVES = 0.05  # m/s of the centre of mass from which a rise has begun
 _SLIDES = 0.1  # m that a foot may travel in a squat or a rise
+_LANDS = 0.3  # s after a landing in which the way down of its absorption begins
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """One repetition in ``trial``: ``kind``; ``side`` of the foot whose gait cycle it is, "both" for squats and rises;
-    ``start``, ``end`` s on the clock of the trial; ``off`` s when the foot leaves the ground (gait), when the seat is
-    left (rise) or when the pelvis is lowest (squat); NaN = not known.
+    """One repetition in ``trial``: ``kind``; ``side`` of the foot whose gait cycle it is, "both" for all others;
+    ``start``, ``end`` s on the clock of the trial; ``off`` s when the foot leaves the ground (gait, jump), when the
+    seat is left (rise) or when the pelvis is lowest (squat); NaN = not known.
     """
 
     trial: str
@@ -203,6 +204,10 @@ class Cycle:
     def overlaps(self, other: "Cycle") -> bool:
         """Return whether two repetitions share time: then nobody stood between them. Each overlaps itself."""
         return self.start < other.end and other.start < self.end
+
+    def near(self, jump: "Cycle") -> bool:
+        """Return whether it is a part of a ``jump``, or of its landing, which goes down like a squat."""
+        return self.start < jump.end + _LANDS and jump.start < self.end
 
     def times(self) -> Array:
         """Return the times (101,) s of `PERCENT`."""

@@ -9,7 +9,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride
-from biodance.lab.plates.faults import GAIN
+from biodance.lab.corrections import GAIN
 from biodance.records import SIDES, Array
 
 ANGLE_PANELS = (
@@ -32,6 +32,7 @@ _INSTANTS: Mapping[str, tuple[str, str]] = {
     "gait": ("at_strike", "at_off"),
     "squat": ("at_start", "at_lowest"),
     "sit_to_stand": ("at_start", "at_seat_off"),
+    "jump": ("at_start", "at_take_off"),
 }
 """What the beginning and ``Cycle.off`` of each kind of cycle are called."""
 _OF_A_FOOT = ("step_length", "step_time", "stance", "margin_aside", "margin_ahead", "contact_time")

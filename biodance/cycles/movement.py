@@ -9,7 +9,14 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.cycles.beside import AngleComparison, EventComparison, compare_angles, compare_events, file_curves
+from biodance.cycles.beside import (
+    AngleComparison,
+    EventComparison,
+    compare_angles,
+    compare_events,
+    emg_curves,
+    file_curves,
+)
 from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
 from biodance.cycles.cut import (
     PERCENT,
@@ -24,10 +31,11 @@ from biodance.cycles.cut import (
     replaced_events,
 )
 from biodance.cycles.ground import ground_curves
+from biodance.cycles.jumps import jumps
 from biodance.cycles.lifts import lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
-from biodance.lab.c3d.subject import FileOutputs
+from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
@@ -37,7 +45,12 @@ from biodance.settings import STANDARD_GRAVITY
 if TYPE_CHECKING:
     import pandas as pd
 
-_WORDS = {"gait": ("gait cycle", "gait cycles"), "squat": ("squat", "squats"), "sit_to_stand": ("rise", "rises")}
+_WORDS = {
+    "gait": ("gait cycle", "gait cycles"),
+    "squat": ("squat", "squats"),
+    "sit_to_stand": ("rise", "rises"),
+    "jump": ("jump", "jumps"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +65,10 @@ class TrialMovement:
         Strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where they saw
         one, else of the markers.
     cycles : tuple of Cycle
-        Gait cycles of each foot, squats, rises from a chair.
+        Gait cycles of each foot, squats, rises from a chair, jumps.
     curves : tuple of CycleCurve
         Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
-        uncertain in them; pelvis, foot progression and centre of mass.
+        uncertain in them; pelvis, foot progression and centre of mass; envelopes of EMG channels (mV).
     strides : tuple of Stride
         Spatio-temporal values of every gait cycle.
     late : tuple
@@ -65,7 +78,7 @@ class TrialMovement:
     file_curves : tuple of CycleCurve
         Plug-in gait's own angles over the gait cycles.
     lifts : tuple of Stride
-        Depth, force share of the feet and rise of the force of every squat and rise.
+        Depth, height, force share of the feet and rise of the force of every squat, rise and jump.
     shared : tuple of Cycle
         Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
     notes : tuple of str
@@ -197,12 +210,12 @@ def trial_movement(
     *,
     sip: Sip | None = None,
     contact: Contact | None = None,
-    outputs: FileOutputs | None = None,
+    outputs: FileOutputs = NO_OUTPUTS,
 ) -> TrialMovement:
     """Return what moved in a prepared trial.
 
     ``sip`` what is known of the inertial parameters (by default the body's), ``contact`` with the plates (None: no
-    forces, so that only trunk and arms have moments), ``outputs`` of another program in the trial's file.
+    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file.
 
     Raises
     ------
@@ -217,15 +230,19 @@ def trial_movement(
     if contact is not None and feet is not None:
         force = foot_events(feet, contact)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
-    found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    sure = _fully_measured(contact, motion.time.size)
+    known_of_feet = np.zeros((motion.time.size, 2), dtype=bool) if contact is None else contact.told
+    jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
+    lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
+    found = (*gait_cycles(trial.name, events), *lifts, *jumped)
+    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
+    sure, whole = _fully_measured(contact, motion.time.size), np.asarray(known_of_feet.all(axis=1))
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
-        theirs += file_curves(cycle, outputs, motion.time, own) if outputs else ()
+        theirs += file_curves(cycle, outputs, motion.time, own)
+        curves += emg_curves(cycle, outputs)
         if contact is not None and feet is not None:
             known = _known_loads(cycle, contact)
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
@@ -237,10 +254,10 @@ def trial_movement(
         tuple(curves),
         strides(cycles, events, body, soles, centre),
         agreement_of_events(force, markers),
-        compare_angles(body, motion, outputs) if outputs else (),
-        compare_events(events, outputs) if outputs else (),
+        compare_angles(body, motion, outputs),
+        compare_events(events, outputs),
         tuple(theirs),
-        tuple(lift(one, centre, motion.time, weight, feet, sure) for one in cycles if one.kind != "gait"),
+        tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
         tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
         _notes(cycles, contact),
     )
@@ -272,11 +289,10 @@ def _inside(cycle: Cycle, contact: Contact) -> Mask:
 
 def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
     if not cycles:
-        return ("No step, no squat and no rise from a chair was found, so there are no cycles.",)
+        return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
-    standing = [_inside(one, contact) for one in cycles if one.kind != "gait"]
-    if standing and np.any(_shared(contact) & np.any(standing, axis=0)):
+    if any(np.any(_shared(contact) & _inside(one, contact)) for one in cycles if one.kind != "gait"):
         return (
             "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
             "difference between left and right moments is not measured.",

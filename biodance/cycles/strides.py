@@ -15,7 +15,9 @@ from biodance.settings import STANDARD_GRAVITY
 
 _BELT = 0.15  # m/s of a standing foot from which the ground is a belt
 _FLAT = (10.0, 25.0)
-"""% of a cycle in which the foot stands flat, of runners too, and tells how fast the ground moves."""
+"""% of a cycle in which the foot stands flat, of runners too, and tells how fast the ground moves: after the loading
+response (to 12 %) and before the heel leaves (31 %; Perry and Burnfield 2010, ISBN 978-1-55642-766-4).
+"""
 STRIDE_UNITS: Mapping[str, str] = {
     "cadence": "steps/min",
     "speed": "m/s",

@@ -21,7 +21,9 @@ from biodance.uncertainty.visits import change_of_mean, visit_mean
 _TURNS = 20.0
 """deg that the pelvis turns from the beginning of a gait cycle to its end from which this is no straight walking."""
 _MIXED = 1.2
-"""Times the slowest trial's speed beyond which the curves of the fastest one are of another way of walking."""
+"""Times the slowest trial's speed beyond which the curves of the fastest one are of another way of walking: all of them
+change with speed (Schwartz et al. 2008, doi:10.1016/j.jbiomech.2008.03.015).
+"""
 _FEWEST = 4
 """Repetitions of a curve without which none of them stands out."""
 _FAR = 4.0

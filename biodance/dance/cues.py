@@ -5,6 +5,7 @@ Only what moves is said, largest first, pairs together (right and left; trunk an
 rounded to what a person can follow; what goes beyond ``MOST`` things is said after them, so that nothing is left out.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -41,6 +42,15 @@ REST = "Then rest: let the arms down. Take up this posture again when you are re
 PLURAL = {"foot": "feet"}
 MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
+
+
+Say = Callable[..., str]
+"""Says a text in some language, with values in the places of ``%(name)s``."""
+
+
+def in_english(text: str, **values: str) -> str:
+    """Return a text with its values, as it is written here."""
+    return text % values
 
 
 CueWords = tuple[str, str, str, str]
@@ -102,9 +112,10 @@ def calls(
     after: Array,
     planted: tuple[str, ...] = (),
     hips: tuple[Array, Array] = (np.zeros(3), np.zeros(3)),
+    say: Say = in_english,
 ) -> tuple[str, ...]:
     """Return what is called on the way from angles ``before`` to ``after`` (n,) degrees, largest change first; ``hips``
-    their turn to the left, drop to the right and tilt forward (3,) degrees before and after.
+    their turn to the left, drop to the right and tilt forward (3,) degrees before and after; as one may ``say`` it.
     """
     changes = {
         joint.name: (float(b), float(a))
@@ -126,7 +137,7 @@ def calls(
         if whole != name and whole in changes and _together((start, end), changes[whole]):
             also = changes.pop(whole)
             size = max(abs(one[1] - one[0]) for one in ((start, end), also))
-            found.append((size, f"{_call(name, '', start, end)}, hips too{_rest(end, also[1])}"))
+            found.append((size, _with_hips(_call(name, "", start, end, say), end, also[1], say)))
             continue
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
@@ -134,7 +145,7 @@ def calls(
         if pair:
             partner = changes.pop(other)
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
-        found.append((abs(end - start), _call(movement, "both" if pair else side, start, end)))
+        found.append((abs(end - start), _call(movement, "both" if pair else side, start, end, say)))
     return tuple(text for _, text in sorted(found, key=lambda call: -call[0]))
 
 
@@ -144,12 +155,16 @@ def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
     return same and (_rounded(trunk[1]) == 0) == (_rounded(hips[1]) == 0)
 
 
-def _rest(trunk: float, hips: float) -> str:
-    """Return how far the hips go (degrees) where it is not as far as the trunk."""
-    return "" if _rounded(trunk) == _rounded(hips) else f", by about {_rounded(hips):.0f}°"
+def _with_hips(trunk_call: str, trunk: float, hips: float, say: Say) -> str:
+    """Return the call of a trunk with which the hips go, too, and how far (degrees) where it is not as far."""
+    if _rounded(trunk) == _rounded(hips):
+        return say("%(move)s, hips too", move=trunk_call)
+    return say("%(move)s, hips too, by about %(angle)s°", move=trunk_call, angle=f"{_rounded(hips):.0f}")
 
 
-def instructions(body: Body, before: Array, after: Array, was: Stance | None, now: Stance) -> tuple[str, ...]:
+def instructions(
+    body: Body, before: Array, after: Array, was: Stance | None, now: Stance, say: Say = in_english
+) -> tuple[str, ...]:
     """Return everything that is called on the way between two postures: what the feet do, then what moves.
 
     ``before``, ``after`` (n,) coordinates of the chain; ``was`` the feet before, None at the start, ``now`` after.
@@ -165,8 +180,8 @@ def instructions(body: Body, before: Array, after: Array, was: Stance | None, no
     for side in now.quiet:  # it hangs, or the hand stays on the frame and the arm follows of itself
         arm = [j for j, joint in enumerate(body.joints) if joint.name.startswith(_ARMS[side])]
         before[arm] = after[arm]
-    moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]))
-    return (*_grip_calls(was, now), *_feet_calls(was, now), *moved)
+    moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]), say)
+    return (*(say(one) for one in (*_grip_calls(was, now), *_feet_calls(was, now))), *moved)
 
 
 def _grip_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
@@ -176,22 +191,23 @@ def _grip_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
     return (f"hold the frame with {'both hands' if len(now.holding) == 2 else f'the {SIDES[now.holding[0]]} hand'}",)
 
 
-def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
+def dance_instructions(dance: Dance, say: Say = in_english) -> tuple[tuple[str, ...], ...]:
     """Return what is called on the way to each posture of a dance, (P); postures are numbered from 1 everywhere."""
     pairs = zip(dance.postures, dance.stances, strict=True)
     angles = [dance.chain.plant(x[None], s.planted, s.ankle)[0] for x, s in pairs]
     out = []
     for p, (after, now) in enumerate(zip(angles, dance.stances, strict=True)):
         before, was = (angles[p - 1], dance.stances[p - 1]) if p else (np.zeros_like(after), None)
-        out.append(MIRROR_CALL if p in dance.mirrored else instructions(dance.body, before, after, was, now))
+        image = tuple(map(say, MIRROR_CALL))
+        out.append(image if p in dance.mirrored else instructions(dance.body, before, after, was, now, say))
     return tuple(out)
 
 
-def skipping(dance: Dance, p: int, before: int) -> tuple[str, ...]:
+def skipping(dance: Dance, p: int, before: int, say: Say = in_english) -> tuple[str, ...]:
     """Return what is called on the way to posture ``p`` straight from posture ``before``, on the same feet."""
     now = dance.stances[p]
     was, x = (dance.chain.plant(dance.postures[k][None], now.planted, now.ankle)[0] for k in (before, p))
-    return instructions(dance.body, was, x, now, now)
+    return instructions(dance.body, was, x, now, now, say)
 
 
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
@@ -224,18 +240,26 @@ def _is_leg(movement: str) -> bool:
     return movement.startswith(("hip", "knee", "ankle"))
 
 
-def _call(movement: str, side: str, start: float, angle: float) -> str:
+def _call(movement: str, side: str, start: float, angle: float, say: Say) -> str:
     part, positive, negative, none = (_words("joints") | _words("hips"))[movement]
-    whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
+    whole = say(limbs_called(part, side)) if part else ""
     rounded = _rounded(angle)
+    back = say(none).format(whole)
     if rounded == 0:
-        return none.format(whole)
+        return back
+    degrees = f"{rounded:.0f}"
     if start * angle > 0 and abs(start) > abs(angle) and rounded == _STEP:
-        return f"{none.format(whole)}, all but about {rounded:.0f}°"
-    high = "to shoulder height" if movement in _LIFTED else "to a right angle"
-    size = high if rounded == 90 else f"by about {rounded:.0f}°"
-    only = "only " if start * angle > 0 and abs(start) > abs(angle) else ""  # from a half squat 15° are less, not more
-    return f"{(positive if angle > 0 else negative).format(whole)} {only}{size}"
+        return say("%(move)s, all but about %(angle)s°", move=back, angle=degrees)
+    high = say("to shoulder height") if movement in _LIFTED else say("to a right angle")
+    size = high if rounded == 90 else say("by about %(angle)s°", angle=degrees)
+    if start * angle > 0 and abs(start) > abs(angle):  # from a half squat 15° are less, not more
+        size = say("only %(size)s", size=size)
+    return say("%(move)s %(size)s", move=say(positive if angle > 0 else negative).format(whole), size=size)
+
+
+def limbs_called(part: str, side: str) -> str:
+    """Return how a ``part`` of one ``side``, or of "both", is called."""
+    return f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
 
 
 def _rounded(angle: float) -> float:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.robot.similarity import SimilarityScale, similar_body
+from biodance.body.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, evenly_spread

@@ -1,7 +1,7 @@
 """FAMILY: one candidate cause of disagreement per file, found automatically: to extend the model, add one file.
 
 The diagnosis fits these causes. The virtual lab makes its faults by OTHER code
-(``virtual_lab/faults/recording_faults.py``, ``causes.py``): what is hidden is not made by the formula that finds it.
+(``virtual_lab/recording_faults.py``, ``causes.py``): what is hidden is not made by the formula that finds it.
 The name of an effect is the name of its file, which gives it as ``EFFECT``; the contract is `Effect` for causes that
 have columns and are fitted, `DiscreteEffect` for those that a look at the recording settles before any statistics.
 Other packages join by the entry points ``biodance.effects``, objects as arguments of ``diagnose``.
@@ -20,7 +20,7 @@ from biodance.effects._base.named_cause import NamedCause
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.transient import Transient
-from biodance.effects._base.words import About, CauseWords, CheckKind
+from biodance.effects._base.words import About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import UnknownName
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
@@ -40,6 +40,7 @@ __all__ = [
     "QualityCheck",
     "Quantity",
     "Recorded",
+    "SessionEntry",
     "Transient",
     "causes",
     "check_quality",

@@ -2,7 +2,7 @@
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
 from biodance.records import Array
 
 _WRONG = 0.3
@@ -40,6 +40,7 @@ class BodyMass(Effect):
         f"Weigh again, {ACCEPT}",
         "a wrong body mass",
         ("more", "less"),
+        entry=SessionEntry.MASS,
     )
     explains = (CheckKind.WEIGHT, CheckKind.FORCES)
 

@@ -11,7 +11,7 @@ from biodance.body.body import Body
 from biodance.effects._base.exchange_spans import Pair, Spans, renamed_markers
 from biodance.effects._base.exchanged_labels import arms_hang, exchanged_labels, set_of
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import canonical
 from biodance.motion.ik.inverse_kinematics import solve_ik
@@ -48,7 +48,12 @@ class LabelsSwapped(DiscreteEffect):
         look_alikes="A marker that fell off or jumps (one of the two is right then).",
         settled_by="Exchanging the two names: only then do the distances fit.",
     )
-    words = CauseWords("{pairs} carry each other's names", f"Exchange them, {ACCEPT}", "exchanged labels")
+    words = CauseWords(
+        "{pairs} carry each other's names",
+        f"Exchange them, {ACCEPT}",
+        "exchanged labels",
+        entry=SessionEntry.EXCHANGE,
+    )
     explains = (CheckKind.PRESSURE, CheckKind.MARKERS)
 
     @classmethod
@@ -64,16 +69,25 @@ class LabelsSwapped(DiscreteEffect):
 def named_exchanges(session: Session, found: Mapping[str, Mapping[Pair, Spans]]) -> tuple[QualityCheck, ...]:
     """Return a failed check for each pair ``found`` by trial, with one sentence for all that are exchanged alike."""
     places: dict[Pair, tuple[str, ...]] = {}
+    names: dict[Pair, tuple[str, ...]] = {}
     for trial in session.trials:
         for pair, spans in found.get(trial.name, {}).items():
             when = _when(trial.markers.time, spans) if trial.markers is not None else ""
             places[pair] = (*places.get(pair, ()), trial.name + when)
+            names[pair] = (*names.get(pair, ()), trial.name)
+    looked = tuple(trial.name for trial in session.trials if trial.markers is not None)
     alike: dict[tuple[str, ...], list[Pair]] = {}
     for pair, where in sorted(places.items()):
         alike.setdefault(where, []).append(pair)
     return tuple(
         QualityCheck(
-            _CHECK, False, _sentence(pairs, where), LabelsSwapped.name, "/".join(pair), advice=LabelsSwapped.advice
+            _CHECK,
+            False,
+            _sentence(pairs, where),
+            LabelsSwapped.name,
+            "/".join(pair),
+            advice=LabelsSwapped.advice,
+            trials=() if names[pair] == looked else names[pair],
         )
         for where, pairs in alike.items()
         for pair in pairs

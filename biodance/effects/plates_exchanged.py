@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.effects._base.words import ACCEPT, About, CauseWords
+from biodance.effects._base.words import ACCEPT, About, CauseWords, SessionEntry
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.prepare import prepare
@@ -47,7 +47,12 @@ class PlatesExchanged(DiscreteEffect):
         ),
         settled_by="Standing on one plate only.",
     )
-    words = CauseWords("{it} carry each other's signals", f"Exchange them, {ACCEPT}", "exchanged plates")
+    words = CauseWords(
+        "{it} carry each other's signals",
+        f"Exchange them, {ACCEPT}",
+        "exchanged plates",
+        entry=SessionEntry.CHANNELS,
+    )
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

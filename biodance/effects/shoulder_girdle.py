@@ -4,7 +4,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import Cut, branch_off
-from biodance.body.human.optional_joints import shoulders, sternoclavicular
+from biodance.body.human.skeleton import shoulders, sternoclavicular
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, doubting

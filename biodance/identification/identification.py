@@ -294,7 +294,7 @@ def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
     notes += [str(together) for together in known_together(fit.sip)]
-    moved = [name.replace("_", " ") for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
+    moved = [display.spaced(name) for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
     if moved:
         notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
     return tuple(notes)

@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from biodance.body.inertia import TENSOR
-from biodance.display import Interval
+from biodance.body.parts import TENSOR
+from biodance.display import Interval, spaced
 from biodance.identification.posterior import BodyPosterior
 from biodance.records import Array, Sip
 
@@ -134,7 +134,7 @@ class Together:
     first_sd: float
 
     def __str__(self) -> str:
-        first, *rest = (name.replace("_", " ") for name in self.segments)
+        first, *rest = (spaced(name) for name in self.segments)
         return (
             f"{first} and {' and '.join(rest)} are known together, not apart: {self.mass:.1f} ± {SIGMAS * self.sd:.1f} "
             f"kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a joint belongs to "

@@ -1,5 +1,6 @@
 """The search for a load as one sentence, the same on every page and in the terminal."""
 
+from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 
 _ADVICE = "Compare with an unloaded session of the same person (--reference)."
@@ -69,4 +70,4 @@ def _unclear(search: LoadSearch) -> str:
 
 
 def _words(segment: str) -> str:
-    return segment.replace("_", " ")
+    return spaced(segment)

@@ -15,7 +15,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
-from biodance.body.inertia import shift_matter
+from biodance.body.parts import shift_matter
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
+from biodance.body.parts import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
 from biodance.errors import NotSolved
 from biodance.identification.posterior import BodyPosterior
 from biodance.records import Array, Sip

@@ -15,7 +15,7 @@ from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker
 from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.corners import Told
-from biodance.lab.read import read_trial, reader_of
+from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature

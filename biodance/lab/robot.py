@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, SessionRefused, UnknownName
-from biodance.lab.read import read_head, read_trial, sniffed
+from biodance.lab.readers import read_head, read_trial, sniffed
 from biodance.library import read_toml, refuse_special
 from biodance.records import ROLES, Array, Markers, Role, Wrench
 from biodance.records.motion import Encoders

@@ -16,6 +16,7 @@ import numpy as np
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import distribute
+from biodance.motion.sitting import sitting
 from biodance.motion.soles import (
     Footing,
     Soles,
@@ -147,13 +148,16 @@ class _Unmeasured(NamedTuple):
 
 
 def _unmeasured_frames(
-    trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask, *, weight: float
+    trial: Trial, place: Footing, feet_down: "_FeetOnGround", borne: Mask
 ) -> tuple[_Unmeasured, ...]:
-    """Return every reason why frames of a prepared trial are not fully measured."""
+    """Return every reason why frames of a prepared trial are not fully measured; ``borne`` (T, P) the plates that feet
+    must have loaded.
+    """
+    touching, rests, load = feet_down.touching, feet_down.rests, feet_down.load
     unloaded = ~load.any(axis=1) & ~flight(trial, touching, load)
     unknown: Mask = np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))
     feet = tuple(one for foot in range(len(SIDES)) for one in _of_foot(place, touching, foot))
-    elsewhere = carried_elsewhere(trial, weight=weight)
+    elsewhere = carried_elsewhere(trial, weight=feet_down.weight)
     beside = np.any([one.frames for one in feet], axis=0)
     for start, stop in runs(elsewhere):
         elsewhere[start:stop] &= beside[start:stop].mean() < _EXPLAINED
@@ -162,7 +166,7 @@ def _unmeasured_frames(
         _Unmeasured(LeftOut.NO_LOAD, "no plate is loaded", unloaded & ~elsewhere),
         _Unmeasured(LeftOut.FORCE_UNKNOWN, "a plate's force is unknown", unknown),
         *feet,
-        *(one for index in range(len(trial.plates)) for one in _of_plate(trial, place, rests, load, index)),
+        *(one for index in range(len(trial.plates)) for one in _of_plate(trial, place, rests, borne, index)),
         _Unmeasured(LeftOut.CARRIED_ELSEWHERE, lacks, elsewhere),
     )
 
@@ -296,7 +300,7 @@ class Contact:
     ``cop_outside`` (T, P) m, distance of a plate's centre of pressure from the soles on it (0 = inside), NaN = hardly
     loaded; ``notes`` how many frames remain, and why no others; ``told`` (T, 2) True where the plates tell what the
     ground does to this foot, whatever the other one stands on; ``left_out`` the frames (T,) that are not measured, by
-    every reason that holds for them.
+    every reason that holds for them; ``seated`` (T,) True where the person sits on the plates (empty: nowhere).
     """
 
     time: Array
@@ -307,13 +311,14 @@ class Contact:
     notes: tuple[str, ...]
     told: Mask
     left_out: Mapping[LeftOut, Mask] = field(default_factory=dict)
+    seated: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
 class _FeetOnGround:
     """The first half of a trial's contact: which plates (T, P) are in ``load`` and ``pressed``, which feet (T, 2)
     ``rests`` and are ``touching``, on what ``surfaces``; the sentences ``belted`` about belts; ``rules`` and ``weight``
-    N of the body.
+    N of the body; where the person is ``seated`` (T,) on the plates.
     """
 
     load: Mask
@@ -324,6 +329,7 @@ class _FeetOnGround:
     belted: tuple[str, ...]
     rules: ContactRules
     weight: float
+    seated: Mask
 
 
 def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan")) -> Contact:
@@ -370,30 +376,42 @@ def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
     load, pressed = (force > max(rules.force, share * largest) for share in (rules.loaded, rules.pressed))
     moving, belted = belts(trial, soles, load)
     speed = speeds(soles, trial.plates, moving)
-    rests = _resting(speed, soles.time, still=rules.still, lasting=rules.lasting)
     weight = float(trial.settings.gravity * mass)
+    seated = sitting(trial, soles, weight=weight)
+    rests = _resting(speed, soles.time, still=rules.still, lasting=rules.lasting) & ~seated[:, None]
     surfaces = find_surfaces(trial, soles, rests, load, weight=weight)
-    touching = _touching(soles, speed, surfaces, rules)
-    return _FeetOnGround(load, pressed, rests, touching, surfaces, belted, rules, weight)
+    touching = _touching(soles, speed, surfaces, rules) & ~seated[:, None]
+    return _FeetOnGround(load, pressed, rests, touching, surfaces, belted, rules, weight, seated)
 
 
 def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Contact:
     """Return the ground contact of a prepared trial whose ``feet`` are known."""
     touching, surfaces = feet.touching, feet.surfaces
     place = footing(trial.plates, soles, surfaces, touching, feet.load)
-    found = _unmeasured_frames(trial, place, touching, feet.rests, feet.load, weight=feet.weight)
+    borne = feet.load & ~feet.seated[:, None]
+    found = _unmeasured_frames(trial, place, feet, borne)
     measured = ~np.any([one.frames for one in found], axis=0)
     outside = cop_outside(trial.plates, soles, place, feet.pressed)
     notes = (
         _unmeasured_notes(measured, found)
+        + _seated_note(feet.seated)
         + _unplaced(trial)
         + feet.belted
         + surfaces.notes
         + overhang_notes(trial.plates, soles, feet.rests & touching & ~place.covered & (place.share > 0))
         + _cop_notes(trial, outside, measured, feet.rules)
     )
-    told = measured[:, None] | _told(trial, place, touching, feet.rests, feet.load)
-    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told, _by_reason(found))
+    told = measured[:, None] | _told(trial, place, touching, feet.rests, borne)
+    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told, _by_reason(found), feet.seated)
+
+
+def _seated_note(seated: Mask) -> tuple[str, ...]:
+    if not seated.any():
+        return ()
+    return (
+        f"The person sits on something that stands on the plates in {int(seated.sum())} of {seated.size} frames: they "
+        f"carry the weight, and both feet hang.",
+    )
 
 
 def _told(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> Mask:
@@ -447,17 +465,13 @@ def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> dict[str, Wre
     distributed between both.
 
     Plates under no foot go to the foot that is nearer to their centre of pressure. The sum is the trial's total wrench;
-    only where ``contact.measured`` is it all that acts on the feet.
+    only where ``contact.measured`` is it all that acts on the feet. Feet of who sits on the plates bear nothing.
     """
-    parts = []
+    parts, standing = [], 1.0 - contact.seated[:, None] if contact.seated.size else 1.0
     for index, plate in enumerate(trial.plates):
-        parts.append(distribute(plate.wrench, *_on_ground(soles, plate.height), contact.on_plate[:, :, index]))
-    total = (np.sum([part[foot].value for part in parts], axis=0) for foot in range(len(SIDES)))
+        # The centres of the right and the left sole (T, 3) m, moved vertically to the plate's height.
+        centre = soles.centre.copy()
+        centre[..., 2] = plate.height
+        parts.append(distribute(plate.wrench, centre[:, 0], centre[:, 1], contact.on_plate[:, :, index]))
+    total = (standing * np.sum([part[foot].value for part in parts], axis=0) for foot in range(len(SIDES)))
     return {f"{side}_foot": Wrench(trial.wrench.time, value) for side, value in zip(SIDES, total, strict=True)}
-
-
-def _on_ground(soles: Soles, height: float) -> tuple[Array, Array]:
-    """Return the centres of the right and the left sole (T, 3) m, moved vertically to the plate's height."""
-    centre = soles.centre.copy()
-    centre[..., 2] = height
-    return centre[:, 0], centre[:, 1]

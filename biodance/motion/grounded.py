@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
-from biodance.body.robot.similarity import sole_normal
+from biodance.body.similarity import sole_normal
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import LowPass, low_pass
 from biodance.motion.kinematics import poses
@@ -191,7 +191,9 @@ def _q(
     rotation, position = _chained(turn, place, foot)
     middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
     if tilt is not None:
-        lean_over = _turns(tilt)
+        from scipy.spatial.transform import Rotation
+
+        lean_over = np.asarray(Rotation.from_rotvec(tilt).as_matrix())
         rotation = lean_over @ rotation
         position = middle + np.einsum("tij,tj->ti", lean_over, position - middle)
     if base is not None:
@@ -300,12 +302,6 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
         rotation[start:stop] = yaw @ np.swapaxes(turn[side, start:stop], 1, 2)
         position[start:stop] = at - np.einsum("tij,tj->ti", rotation[start:stop], place[side, start:stop])
     return rotation, position
-
-
-def _turns(vector: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
 
 
 def _quaternions(rotation: Array) -> Array:

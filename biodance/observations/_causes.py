@@ -1,7 +1,7 @@
 """What causes do to a recording: plates' records are changed as a wrong file, cable or clock would change them.
 
 Names and parameters are those of the effects (`biodance.effects`). What a fault of a plate does to its wrench is said
-once (`lab.plates.faults`): observations' sensitivities and the correction of a recording both come from it.
+once (`lab.corrections`): observations' sensitivities and the correction of a recording both come from it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from biodance.effects.added_mass import AddedMass
 from biodance.effects.axis_error import AxisError
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.toe_landmark import ToeLandmark
-from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
+from biodance.lab.corrections import CROSSTALK, DELAY, GAIN, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
 from biodance.observations._recording import SeenTrial
 from biodance.observations._sensitivity import Sensitivity
 from biodance.records import CHANNELS, SIDES, Array, Plate, Wrench

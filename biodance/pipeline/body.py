@@ -18,8 +18,7 @@ from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.contact import carried_elsewhere
 from biodance.motion.dynamics import predict_wrench
-from biodance.motion.ik.functional_joints import PLACED, functional_joints
-from biodance.motion.optional_joints import JointGain, with_shown_joints
+from biodance.motion.ik.functional_joints import PLACED, JointGain, functional_joints, with_shown_joints
 from biodance.motion.track import track
 from biodance.pipeline.trial import attempt, track_trial
 from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, ShownJoints, Step, TrialResult

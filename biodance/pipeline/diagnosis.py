@@ -22,9 +22,8 @@ from biodance.identification.added_mass import LoadSearch
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
-from biodance.pipeline.accepted import with_faults_undone, with_right_labels
+from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections, with_right_labels
 from biodance.pipeline.attention import reconcile_with_checks
-from biodance.pipeline.gains import accepted, with_proven_corrections
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out, recorded_of
 from biodance.pipeline.load import with_load, with_weighed_load

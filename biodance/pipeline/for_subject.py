@@ -12,7 +12,7 @@ from biodance.body.body import Body
 from biodance.cycles.summary import Repetitions
 from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.lab.session.file import VisitEntry, read_session_file
-from biodance.motion.quiet_standing import QuietStanding
+from biodance.motion.newton import QuietStanding
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult

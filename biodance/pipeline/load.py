@@ -9,7 +9,7 @@ from biodance.effects import CheckKind
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
 from biodance.inference.decision import UNPLACED_LOAD
-from biodance.pipeline.checks import load_doubts
+from biodance.pipeline.identification import load_doubts
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.words import LOAD, cause_of, explained
 

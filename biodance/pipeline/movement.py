@@ -14,7 +14,7 @@ from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
-from biodance.pipeline.lab_file import read_lab
+from biodance.pipeline.laboratory import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import movement_of
@@ -80,7 +80,7 @@ class SessionMovement:
 
     @cached_property
     def repetitions(self) -> Mapping[str, Repetitions]:
-        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand"), the kinds that there are."""
+        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand", "jump"), those there are."""
         kinds = dict.fromkeys(cycle.kind for one in self.trials for cycle in one.cycles)
         return {kind: repetitions_of(kind, self.trials) for kind in kinds}
 

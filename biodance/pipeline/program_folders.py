@@ -13,20 +13,24 @@ from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
-from biodance.lab.bids import (
+from biodance.lab.plain_text import write_whole
+from biodance.lab.program_tables import (
     COMPONENTS,
     BidsChannels,
+    TimeTable,
     bids_label,
+    external_loads,
+    ground_table,
+    inverse_dynamics_setup,
     write_description,
     write_events,
+    write_mot,
     write_motion,
     write_participants,
 )
-from biodance.lab.opensim_tables import TimeTable, external_loads, ground_table, inverse_dynamics_setup, write_mot
-from biodance.lab.plain_text import write_whole
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.results_folder import made_folder, whole_folder
-from biodance.motion.contact import Contact, foot_wrenches
+from biodance.motion.contact import foot_wrenches
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
@@ -244,7 +248,9 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
     files.append(write_whole(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
-    span = _span(contact, motion)
+    # The longest run of frames in which plates and markers tell all; None where it is too short.
+    first, stop = longest_run(contact.measured & motion.determined)
+    span = slice(first, stop) if stop - first >= _SHORTEST else None
     if span is None:
         return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
     between = (float(motion.time[span.start]), float(motion.time[span.stop - 1]))
@@ -259,12 +265,6 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files.append(write_whole(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
     files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
     return OpensimTrial(name, tuple(files), between)
-
-
-def _span(contact: Contact, motion: Motion) -> slice | None:
-    """Return the longest run of frames in which plates and markers tell all; None where it is too short."""
-    first, stop = longest_run(contact.measured & motion.determined)
-    return slice(first, stop) if stop - first >= _SHORTEST else None
 
 
 def _torques(body: Body, motion: Motion, ground: dict[str, Wrench], span: slice, name: str) -> TimeTable:

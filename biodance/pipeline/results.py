@@ -21,16 +21,38 @@ from biodance.effects._base.exchange_spans import Pair, Spans
 from biodance.identification.identification import Identification
 from biodance.inference.decision import Inferred
 from biodance.lab.corrections import PlateCorrection
-from biodance.motion.quiet_standing import QuietStanding
+from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.placed import Placed
 from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing
-from biodance.records import Session, Sip, Subject, by_name
+from biodance.records import Mask, Session, Sip, Subject, by_name
 from biodance.records.attention import NOT_USED, WARNING
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """The ``body`` of a ``subject`` with the joints that its markers ``shown``, ``plain`` without them, its ``source``
+    in words, its ``prior``, and the ``steps`` to it; from the ``known`` body of an earlier session where there is one.
+    Frames ``hidden`` (T,) of each trial, in which something else carries, placed no joint.
+    """
+
+    subject: Subject
+    known: Body | None
+    hidden: tuple[Mask, ...]
+    body: Body | None
+    plain: Body | None
+    source: str
+    prior: Sip | None
+    shown: ShownJoints
+    steps: tuple[Step, ...]
+
+    def holds(self, other: "tuple[Subject, Body | None, tuple[Mask, ...]]") -> bool:
+        """Return whether another subject, known body and hidden frames are those of this one."""
+        subject, known, hidden = other
+        return subject == self.subject and known is self.known and all(map(np.array_equal, hidden, self.hidden))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +216,7 @@ class SessionResult:
     @property
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about, not computed or outside its limit."""
-        said = self.failures or self.session.refused or self.doubts or self.unused or self.slips
+        said = self.failures or self.session.refused or self.doubts or self.slips
         undone = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
         return bool(said) or undone or any(not check.inside for check in self.all_checks)
 

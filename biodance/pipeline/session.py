@@ -14,20 +14,23 @@ from biodance.identification.limbs import with_declared_limbs
 from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.corrections import PlateCorrection, corrected_trial
 from biodance.motion.contact import carried_elsewhere
-from biodance.motion.quiet_standing import QuietStanding
+from biodance.motion.newton import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
-from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh, with_weighed_mass
 from biodance.pipeline.identification import (
     FITTED_ROLES,
     SessionIdentification,
     can_identify,
     fits_of_roles,
     identify_trials,
+    mass_check,
     predicted,
+    standing_check,
+    trial_checks,
+    weigh,
+    with_weighed_mass,
 )
-from biodance.pipeline.placed import Placed
-from biodance.pipeline.results import SessionResult
-from biodance.pipeline.still import load_still, still_of, worst_still
+from biodance.pipeline.results import Placed, SessionResult
+from biodance.pipeline.scenes import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
 from biodance.records import Mask, Motion, Session

@@ -11,7 +11,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.read import read_trial
+from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
 from biodance.pipeline.body import body_of
 from biodance.pipeline.live import LiveResult, LiveSession, LiveState

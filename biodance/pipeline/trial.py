@@ -8,18 +8,18 @@ from typing import TypeVar
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.optional_joints import marker_groups
+from biodance.body.human.skeleton import marker_groups
 from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point
-from biodance.lab.c3d.subject import FileOutputs, read_outputs
+from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs, read_outputs
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.prepare import prepare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.dynamics import compare, predict_wrench
-from biodance.motion.quiet_standing import quiet_standing
+from biodance.motion.newton import quiet_standing
 from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.track import track, with_own_cutoff
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit
@@ -241,11 +241,11 @@ def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
         return None
 
 
-def _outputs(trial: Trial) -> FileOutputs | None:
-    """Return what another program wrote into the trial's file; None where it is no C3D file or cannot be read again."""
+def _outputs(trial: Trial) -> FileOutputs:
+    """Return what else the trial's file holds; nothing where it is no C3D file or cannot be read again."""
     if trial.source.format != "C3D":
-        return None
+        return NO_OUTPUTS
     try:
         return read_outputs(trial.source.path)
     except BiodanceError:
-        return None
+        return NO_OUTPUTS

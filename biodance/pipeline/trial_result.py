@@ -17,8 +17,8 @@ from biodance.identification.statistics import Fit
 from biodance.lab.corrections import PlateCorrection, correction_doubts
 from biodance.lab.markers.signals import MarkerGaps
 from biodance.motion.contact import Contact
-from biodance.motion.optional_joints import JointGain
-from biodance.motion.quiet_standing import QuietStanding
+from biodance.motion.ik.functional_joints import JointGain
+from biodance.motion.newton import QuietStanding
 from biodance.records import CHANNEL_TITLES, Array, LeftOut, Motion, Trial, Wrench
 
 if TYPE_CHECKING:

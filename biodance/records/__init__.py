@@ -22,12 +22,9 @@ from biodance.records.arrays import (
     spread_frames,
 )
 from biodance.records.attention import LeftOut
-from biodance.records.markers import Markers
 from biodance.records.motion import AngleSpan, AngleState, Motion
-from biodance.records.recording import Defect, FootEvent, LeftOutSpan, Source
-from biodance.records.session import ROLES, Role, Session, Trial
-from biodance.records.subject import SIDES, FootSizes, Sip, Subject, side_in_name
-from biodance.records.wrench import Plate, Wrench
+from biodance.records.session import ROLES, SIDES, FootSizes, Role, Session, Sip, Subject, Trial, side_in_name
+from biodance.records.wrench import Defect, FootEvent, LeftOutSpan, Markers, Plate, Source, Wrench
 
 __all__ = [
     "CHANNELS",

@@ -1,15 +1,23 @@
-"""The wrench of the ground on the subject, in all and by plate."""
+"""A measured time series and what is known of it beside its samples (where it came from, what was wrong in it, what is
+left out of it): where the markers were, and the wrench of the ground on the subject, in all and by plate.
+"""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance import display
+from biodance.errors import BiodanceError, known_index
 from biodance.records.arrays import (
     CHANNEL_TITLES,
     CHANNELS,
     Array,
+    any_coordinate,
     assign,
     check_time,
     freeze,
@@ -24,6 +32,231 @@ from biodance.spatial import zero_moment_point
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a trial came from.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file.
+    sha256 : str
+        Of its bytes.
+    format : str
+        What it was read as.
+    rate, analog_rate : float
+        Hz; NaN = none.
+    first_frame : int
+        Its number in the file.
+    """
+
+    path: Path
+    sha256: str
+    format: str
+    rate: float = float("nan")
+    analog_rate: float = float("nan")
+    first_frame: int = 1
+
+
+@dataclass(frozen=True)
+class Defect:
+    """What was wrong in a recording and was left out when it was read.
+
+    Parameters
+    ----------
+    effect : str
+        The cause, by its name among the effects (``dead_plate``).
+    target : str
+        Where: a plate (``plate1``); "" for the whole recording.
+    text : str
+        What was seen and done, one plain sentence.
+    size : float
+        Of it, NaN = none.
+    unit : str
+        Of the size.
+    """
+
+    effect: str
+    target: str
+    text: str
+    size: float = float("nan")
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class LeftOutSpan:
+    """Seconds ``start`` to ``end`` of a trial that the analyst leaves out: of one ``side`` its cycles, of "" all cycles
+    and the forces.
+    """
+
+    start: float
+    end: float
+    side: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.start:g} to {self.end:g} s{f' ({self.side})' if self.side else ''}"
+
+
+@dataclass(frozen=True)
+class FootEvent:
+    """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down (a
+    strike), False where it leaves (an off); ``source`` "force" where a plate saw it, "markers" where the movement of
+    the feet tells it, "hand" where session.toml says it.
+    """
+
+    time: float
+    side: str
+    down: bool
+    source: Literal["force", "markers", "hand"] = "force"
+
+
+@dataclass(frozen=True, eq=False)
+class Markers:
+    """Marker trajectories in the lab frame.
+
+    Parameters
+    ----------
+    names : tuple of str
+        (K) labels as in the file, each once.
+    time : array_like
+        (T,) s, increasing.
+    xyz : array_like
+        (T, K, 3) m, lab frame, z up; NaN where a marker was not seen.
+    filled : array_like of bool
+        (T, K) True where a place was put into a gap (`fill_gaps`); by default nowhere.
+
+    Raises
+    ------
+    BiodanceError
+        Shapes do not fit together, time does not increase, or a name occurs twice.
+
+    Examples
+    --------
+    >>> markers = session["squat_1"].markers
+    >>> markers["LASI"].shape
+    (611, 3)
+    >>> "LASI" in markers
+    True
+    """
+
+    names: tuple[str, ...]
+    time: Array
+    xyz: Array
+    filled: NDArray[np.bool_] = field(default_factory=lambda: np.empty((0, 0), dtype=bool))
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names)
+        time = check_time(self.time, "Markers")
+        assign(self, names=names, time=time, xyz=frozen_array(self.xyz, (time.size, len(names), 3), "Markers.xyz"))
+        if len(set(names)) != len(names):
+            twice = sorted({n for n in names if names.count(n) > 1})
+            raise BiodanceError(f"Marker names occur twice: {', '.join(twice)}.")
+        filled = np.array(self.filled, dtype=bool)
+        if filled.size and filled.shape != (time.size, len(names)):
+            raise BiodanceError(f"Markers.filled has shape {filled.shape}, expected ({time.size}, {len(names)}).")
+        filled.setflags(write=False)
+        assign(self, filled=filled)
+
+    def __repr__(self) -> str:
+        return f"Markers({len(self.names)} markers, {span(self.time)})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table().describe())
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz; NaN for fewer than two frames."""
+        return rate_of(self.time)
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where a marker was seen, (T, K) bool; read-only."""
+        seen = np.logical_not(any_coordinate(np.isnan(self.xyz)))
+        seen.setflags(write=False)
+        return seen
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Where a marker was seen by the cameras and not put into a gap, (T, K) bool."""
+        return self.seen & ~self.filled if self.filled.size else self.seen
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the trajectory (T, 3) m of one marker by its label."""
+        return self.xyz[:, known_index("marker of this trial", name, self.names)]
+
+    def select(self, names: Iterable[str]) -> "Markers":
+        """Return only the named markers, in the order given.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Labels of this record.
+
+        Returns
+        -------
+        Markers
+            With the same times.
+
+        Raises
+        ------
+        UnknownName
+            A label is not there; the legal ones are named.
+
+        Examples
+        --------
+        >>> session["squat_1"].markers.select(["LASI", "RASI"]).names
+        ('LASI', 'RASI')
+        """
+        names = tuple(names)
+        if names == self.names:
+            return self
+        chosen = [known_index("marker of this trial", name, self.names) for name in names]
+        xyz = self.xyz.take(chosen, axis=1)
+        xyz.setflags(write=False)  # the record keeps it without a copy
+        return Markers(names, self.time, xyz, self.filled[:, chosen] if self.filled.size else self.filled)
+
+    def table(self) -> "pd.DataFrame":
+        """Return the trajectories as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index time (s); three columns a marker, ``LASI x (m)`` and so on, lab frame.
+
+        Examples
+        --------
+        >>> list(session["squat_1"].markers.table().columns[:3])
+        ['RASI x (m)', 'RASI y (m)', 'RASI z (m)']
+        """
+        columns = [f"{name} {axis} (m)" for name in self.names for axis in "xyz"]
+        return in_time(self.time, self.xyz.reshape(self.time.size, -1), columns)
+
+    def plot_xyz(self, name: str, *, axes: "Axes | None" = None) -> "Axes":
+        """Draw the three coordinates of one marker over time.
+
+        Parameters
+        ----------
+        name : str
+            Label of the marker.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Metres over seconds.
+
+        Examples
+        --------
+        >>> session["squat_1"].markers.plot_xyz("LASI").get_ylabel()
+        'LASI (m)'
+        """
+        return display.curves(self.time, self[name], ("x", "y", "z"), f"{name} (m)", axes=axes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -229,17 +229,13 @@ def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -
             f"Under no delay do the plates carry anybody for {_LEAST:g} s while the markers are seen. "
             "Are these the files of one trial?"
         )
-    peaks = sorted(_peaks(found), key=lambda one: -one.gain)
+    # The alignments that explain no less than those of the delays beside theirs.
+    gain = np.array([-np.inf, *(one.gain for one in found), -np.inf])
+    top = (gain[1:-1] >= gain[:-2]) & (gain[1:-1] >= gain[2:])
+    peaks = sorted([one for one, is_top in zip(found, top, strict=True) if is_top], key=lambda one: -one.gain)
     fine = peaks[0].pose.delay + np.arange(-_STEP, 1.05 * _STEP, _STEP / 4)
     best = max(_scanned(motion, needed, forces, height, fine), key=lambda one: one.gain)
     return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > _APART))
-
-
-def _peaks(found: list[Alignment]) -> list[Alignment]:
-    """Return the alignments that explain no less than those of the delays beside theirs."""
-    gain = np.array([-np.inf, *(one.gain for one in found), -np.inf])
-    top = (gain[1:-1] >= gain[:-2]) & (gain[1:-1] >= gain[2:])
-    return [one for one, is_top in zip(found, top, strict=True) if is_top]
 
 
 def _scanned(

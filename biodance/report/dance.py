@@ -17,30 +17,39 @@ from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.plain_text import for_spreadsheet
-from biodance.pipeline.dance_result import DanceResult, not_safe
-from biodance.pipeline.preview import held_postures, preview_markers, preview_parameters, setpoints
-from biodance.pipeline.still import posture_still, silhouettes
+from biodance.pipeline.dance import DanceResult, not_safe
+from biodance.pipeline.scenes import (
+    held_postures,
+    posture_still,
+    preview_markers,
+    preview_parameters,
+    setpoints,
+    silhouettes,
+)
 from biodance.records import Array
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.files import write_files
+from biodance.report.pages.dance_words import posture_said
+from biodance.report.pages.language import ENGLISH, N_, read_language
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema, markdown_table, plain_values, shown, to_text
 from biodance.report.terminal import print_line, print_table
 
-_VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
+_Eyes = tuple[tuple[str, tuple[float, float]], ...]
+_VIEWS: _Eyes = ((N_("from the front"), (1.0, 0.0)), (N_("from the right"), (0.0, -1.0)))
 """Where the eye is in the horizontal plane, for a person who faces lab x."""
 _TALL, _GAP, _LABEL = 150.0, 12.0, 70.0
 """Height of the picture in its own units, what is left between the views, and the room that their words take."""
 _MIDDLE = "#8d99a6"
 
 
-def mannequin_svg(body: Body, q: Array, title: str) -> str:
+def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS) -> str:
     """Return the picture of the posture ``q`` (nq,): from the front (the person's right is on the left) and from the
-    right; ``title`` is read to those who cannot see it.
+    right, or by other ``eyes``; ``title`` is read to those who cannot see it.
     """
-    views = [(words, silhouettes(body, q, eye)) for words, eye in _VIEWS]
+    views = [(words, silhouettes(body, q, eye)) for words, eye in eyes]
     height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
     for words, parts in views:
@@ -64,38 +73,35 @@ def _colour(segment: str) -> str:
     return SIDE_COLOURS[side][0] if side in SIDE_COLOURS and side != "middle" else _MIDDLE
 
 
-def cards_page(result: DanceResult) -> str:
-    """Return the page (HTML) of a dance that keeps its limits."""
+def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:
+    """Return the page (HTML) of a dance that keeps its limits, in a ``language`` of `read_language`."""
     from markupsafe import Markup
 
-    dance = result.dance
+    dance, words = result.dance, read_language(language)
     assert dance is not None
-    postures, cues, pauses = held_postures(dance).q, [], rests(dance)
-    for p, (said, stance) in enumerate(zip(dance_instructions(dance), dance.stances, strict=True)):
-        name, feet = dance.names[p] if dance.names else "posture", stance_words(stance)
+    say, postures, cues, pauses = words.say, held_postures(dance).q, [], rests(dance)
+    for p, (said, stance) in enumerate(zip(dance_instructions(dance, say), dance.stances, strict=True)):
+        name = posture_said(dance.names[p], say) if dance.names else say("posture")
+        feet = say(stance_words(stance))
         title = f"{p + 1}. {name}, {feet}"
-        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title))))
+        views = tuple((say(view), eye) for view, eye in _VIEWS)
+        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title)), views))
         called = {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said}
-        cues.append(called | {"picture": picture, "rest": REST if pauses[p] else ""})
+        cues.append(called | {"picture": picture, "rest": say(REST) if pauses[p] else ""})
     return render(
         "cues.html.j2",
+        language=words.tag,
+        say=say,
         name=dance.protocol,
         count=len(cues),
-        minutes=_minutes(dance.duration),
-        move=f"{float(np.median(dance.move)):g}",
-        hold=f"{float(np.max(dance.hold)):g}",
+        minutes=words.count("about %(number)s minute", "about %(number)s minutes", max(1, round(dance.duration / 60))),
+        move=words.number(float(np.median(dance.move)), 1).removesuffix(words.number(0.5, 1)[1:2] + "0"),
+        hold=words.number(float(np.max(dance.hold)), 1).removesuffix(words.number(0.5, 1)[1:2] + "0"),
         about=result.about,
-        care=dance.care,
+        care=[say(one) for one in dance.care],
         unsafe=not_safe(dance),
-        right="blue",
-        left="orange",
         cues=cues,
     )
-
-
-def _minutes(seconds: float) -> str:
-    """Return a duration as it is said: "about a minute", "about 2 minutes"."""
-    return "about a minute" if seconds < 90 else f"about {seconds / 60:.0f} minutes"
 
 
 MARGIN_ROW = Schema(
@@ -190,8 +196,11 @@ DOTS = 160
 """Dots per inch of the figures."""
 
 
-def write_dance(result: DanceResult, folder: Path, *, despite: bool = False) -> dict[str, Any]:
-    """Write all files of a dance into ``folder`` (which exists) and return the content of ``results.json``.
+def write_dance(
+    result: DanceResult, folder: Path, *, despite: bool = False, language: str | Path = ENGLISH
+) -> dict[str, Any]:
+    """Write all files of a dance into ``folder`` (which exists) and return the content of ``results.json``; the cards
+    in a ``language``.
 
     A dance that does not keep every limit is not written: then ``results.json`` alone says why. Of one that imprecise
     people cannot dance safely what leads a person is only written ``despite`` that.
@@ -202,7 +211,7 @@ def write_dance(result: DanceResult, folder: Path, *, despite: bool = False) -> 
         dance = result.dance
         dance.save(folder / "dance.npz")
         if despite or not dance.unsafe:
-            texts |= _leading(result, dance, folder)
+            texts |= _leading(result, dance, folder, language)
         texts["margins.md"] = _MARGINS.format(markdown_table(MARGIN_ROW, found["margins"]))
         counted = np.flatnonzero(dance.counted).tolist()
         titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
@@ -229,7 +238,7 @@ Checked on the finished dance, every 0.01 s, by other code than its design.
 {}"""
 
 
-def _leading(result: DanceResult, dance: Dance, folder: Path) -> dict[str, str]:
+def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Path) -> dict[str, str]:
     """Write dance.c3d; return what leads a person, or a robot, through the dance by file; NOT SAFE comes first."""
     if not dance.body.markers.names:
         return {"cues.md": angle_sheet(dance), "dance.csv": angle_table(dance)}
@@ -243,7 +252,7 @@ def _leading(result: DanceResult, dance: Dance, folder: Path) -> dict[str, str]:
         about=(*not_safe(dance), *dance.care, *result.about),
         rests=rests(dance),
     )
-    return {"cues.md": cues, "cues.html": cards_page(result)}
+    return {"cues.md": cues, "cues.html": cards_page(result, language)}
 
 
 def _short(stance: Stance) -> str:

@@ -127,7 +127,7 @@ def _validated(trials: list[dict[str, Any]]) -> str:
 
 def _movement(trials: list[dict[str, Any]]) -> str:
     kinds = [cycle["kind"] for one in trials for cycle in one["cycles"]]
-    words = {"gait": "gait cycle", "squat": "squat", "sit_to_stand": "rise from a chair"}
+    words = {"gait": "gait cycle", "squat": "squat", "sit_to_stand": "rise from a chair", "jump": "jump"}
     found = [
         _count(kinds.count(kind), word, "rises from a chair" if kind == "sit_to_stand" else None)
         for kind, word in words.items()

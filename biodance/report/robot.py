@@ -6,9 +6,8 @@ from rich.console import Console
 
 from biodance.body.body import body_text
 from biodance.display import spaced
-from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
-from biodance.pipeline.saved_results import BODY_FILE
+from biodance.pipeline.saved_results import BODY_FILE, now
 from biodance.report.files import write_files
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import render, template_text

@@ -14,9 +14,8 @@ from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
-from biodance.pipeline.provenance import now, provenance
-from biodance.pipeline.visit_quantities import ComparedQuantity, Untested
-from biodance.pipeline.visits import VisitComparison
+from biodance.pipeline.saved_results import now, provenance
+from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
 from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
 from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.files import for_spreadsheets, write_files
@@ -88,7 +87,7 @@ def comparison_sentence(found: VisitComparison) -> str:
 def quantity_in_words(one: ComparedQuantity) -> str:
     """Return a quantity as a person says it: ``left knee flexion, maximum``; a squat's or a rise's says so."""
     side = f"{one.side} " if one.side in ("left", "right") else ""
-    kind = {"squat": " (squat)", "sit_to_stand": " (rise)"}.get(one.kind, "")
+    kind = {"squat": " (squat)", "sit_to_stand": " (rise)", "jump": " (jump)"}.get(one.kind, "")
     return f"{side}{spaced(one.quantity)}{f', {spaced(one.key)}' if one.key else ''}{kind}"
 
 

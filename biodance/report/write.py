@@ -9,20 +9,18 @@ from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.corrections import APPLIED, PlateCorrection
-from biodance.pipeline.accepted import CORRECTED, Written, write_corrected, write_mended
+from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import corrected_attention, identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.gains import accepted_corrections
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
-from biodance.pipeline.lab_file import LAB, lab_text
+from biodance.pipeline.laboratory import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions
-from biodance.pipeline.session_frames import frames_of
+from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
+from biodance.pipeline.scenes import frames_of
 from biodance.records.attention import Attention
 from biodance.report.files import write_files
 from biodance.report.methods import METHODS, methods_text

@@ -9,8 +9,7 @@ import functools
 
 import numpy as np
 
-from biodance.body.inertia import TENSOR
-from biodance.body.parts import JointError
+from biodance.body.parts import TENSOR, JointError
 from biodance.body.tables.choice import BASE, PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.body.tables.segment_data import read_segment_table

@@ -22,7 +22,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew

@@ -6,9 +6,10 @@ OUT/truth/truth.json                   what only the simulation knows; no other 
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,24 +17,25 @@ from biodance.errors import BiodanceError
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Subject
 from biodance.threads import one_thread
-from biodance.virtual_lab.faults.forces import wobbling_mass
+from biodance.virtual_lab.causes import wobbling_mass
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.person.prosthesis import with_prostheses
+from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.laboratory import SWINGING, Laboratory, soft_parts
-from biodance.virtual_lab.recording.visit import (
+from biodance.virtual_lab.truth import CARRIERS, truth
+from biodance.virtual_lab.visit import (
     FIRST_VISIT,
+    SWINGING,
     Instruments,
+    Laboratory,
     LabVisit,
     perform_in,
     record,
     scale_reading,
     set_up,
+    soft_parts,
     write,
 )
-from biodance.virtual_lab.truth import CARRIERS, truth
 
 TRUTH = "truth"
 """Name of the folder inside a simulated session that holds the truth."""
@@ -75,9 +77,10 @@ def write_visit(
     seed: int,
     loads: tuple[AddedLoad, ...] = (),
     visit: LabVisit = FIRST_VISIT,
+    bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its
-    folder.
+    folder; markers were glued on somebody with joints ``bent`` by so many rad.
 
     Raises
     ------
@@ -98,7 +101,7 @@ def write_visit(
         joint_shifts=visit.joint_shifts,
         population=visit.laboratory.population,
     )
-    person = with_prostheses(person, visit.lighter_limbs)
+    person = replace(with_prostheses(person, visit.lighter_limbs), bent=bent)
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
     with whole_folder(out) as part:
         _write(plan, person, instruments, visit, performed, part)

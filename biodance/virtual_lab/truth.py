@@ -10,11 +10,11 @@ from biodance.errors import UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Sip
 from biodance.version import __version__
+from biodance.virtual_lab.instruments import reference_angles
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.person.person import AddedLoad, Person, of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.instruments import reference_angles
-from biodance.virtual_lab.recording.visit import Instruments
+from biodance.virtual_lab.visit import Instruments
 
 MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
     "pelvis": ("", ("pelvis",)),

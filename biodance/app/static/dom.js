@@ -66,14 +66,20 @@ async function answered(response) {
 }
 
 export const number = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
-export const words = (name) => name.replaceAll("_", " ");
+export const words = (name) =>
+  name.replace("trunk_head", "trunk with head").replace("forearm_hand", "forearm with hand").replaceAll("_", " ");
 export const chip = (text, kind = "") => h("span", { cls: `chip ${kind}` }, text);
 
 export function download(query, text) {
   return h("a", { cls: "button", href: `/download?${new URLSearchParams(query)}`, download: true }, text);
 }
 
-const VERDICTS = { clean: "good", "nothing wrong": "good", unknown: "bad" };
+const VERDICTS = {
+  "nothing wrong": ["nothing wrong", "good"],
+  "named, complete": ["cause found", "look"],
+  "named, incomplete": ["cause found, more is open", "look"],
+  unexplained: ["cause not known", "look"],
+};
 const STATES = { done: "good", "needs a person": "look", refused: "bad", failed: "bad" };
 
 export function chips(found) {
@@ -82,6 +88,6 @@ export function chips(found) {
   const shown = [];
   if (!found.fresh) shown.push(chip("changed since the run", "look"));
   shown.push(chip(found.status, STATES[found.status] || ""));
-  if (found.verdict) shown.push(" ", chip(found.verdict, VERDICTS[found.verdict] || "look"));
+  if (found.verdict) shown.push(" ", chip(...(VERDICTS[found.verdict] || [found.verdict, "look"])));
   return shown.flatMap((one) => [one, " "]);
 }

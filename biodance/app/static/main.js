@@ -1,10 +1,12 @@
 // The window: which page is shown (the address behind #), what runs, and whether another tab changed something.
 import { showArchive } from "./archive.js";
 import { ask, h, say, tell } from "./dom.js";
+import { showLimits } from "./limits.js";
 import { showSession } from "./session.js";
 
 const main = document.getElementById("main");
 const page = { turn: 0, name: "", revision: "", refresh: null, run: null };
+Object.assign(page, { queue: Promise.resolve(), busy: 0, waiting: new Set() }); // changes that are not answered yet
 
 export function address(name, tab = "trials") {
   return name ? `#/${encodeURIComponent(name)}/${tab}` : "#/";
@@ -14,7 +16,8 @@ async function show() {
   page.turn += 1;
   const [, name, tab] = location.hash.split("/").map(decodeURIComponent);
   try {
-    if (name) await showSession(main, page, name, tab || "trials");
+    if (location.hash === "#limits") await showLimits(main, page);
+    else if (name) await showSession(main, page, name, tab || "trials");
     else await showArchive(main, page);
   } catch (error) {
     main.replaceChildren(h("p", {}, error.message), h("p", {}, h("a", { href: "#/" }, "All sessions")));
@@ -60,12 +63,15 @@ function showRun(run) {
 async function look() {
   // every two seconds, sooner while something runs
   try {
-    const found = await ask("state", page.name ? { name: page.name } : {});
+    const mine = page.busy, // what a change of ours does is no other's doing
+      about = page.name,
+      found = await ask("state", about ? { name: about } : {});
     const before = page.run;
     page.run = found.run;
     showRun(found.run);
     if (found.run?.state === "failed" && before?.state === "running") say(found.run.why);
-    if (page.name && page.revision && found.revision !== page.revision) {
+    const idle = !mine && !page.busy && about === page.name;
+    if (idle && page.name && page.revision && found.revision !== page.revision) {
       say("session.toml was changed elsewhere, in another tab or an editor. It is shown as it is now.");
       page.revision = found.revision;
       await page.refresh?.();

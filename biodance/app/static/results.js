@@ -39,6 +39,12 @@ export async function showBody(all) {
     put(all.panel, frame(all.name, "body", "The body of the last run, its replay and masses"));
 }
 
+function place({ about, trial }) {
+  // where a sentence belongs: what is looked at, and the recording
+  const what = words(["", "file", "diagnosis"].includes(about) ? "" : about);
+  return [what && what[0].toUpperCase() + what.slice(1), trial].filter(Boolean).join(", ") || "Session";
+}
+
 export async function showQuality(all) {
   const { panel, name } = all,
     found = await resultsOf(all);
@@ -50,7 +56,7 @@ export async function showQuality(all) {
     h(
       "ul",
       {},
-      rows.map((one) => h("li", {}, one.trial ? h("strong", {}, `${one.trial}: `) : "", one.text)),
+      rows.map((one) => h("li", {}, h("strong", {}, `${place(one)}: `), one.text)),
     );
   put(
     panel,
@@ -67,7 +73,7 @@ export async function showQuality(all) {
       : "",
     acts.length ? [h("h2", {}, "What needs a person"), list(acts)] : "",
     notes.length
-      ? h("details", {}, h("summary", {}, `${notes.length} notes that ask nobody for anything`), list(notes))
+      ? h("details", {}, h("summary", {}, `Notes that ask nobody for anything: ${notes.length}`), list(notes))
       : "",
     h("h2", {}, "Findings"),
     found.findings.length ? findings(found.findings, all) : h("p", {}, "No cause was found."),
@@ -119,16 +125,22 @@ function judged(rows) {
   );
 }
 
+const SHOWN = { m: [1000, "mm", 0], rad: [180 / Math.PI, "°", 1], s: [1000, "ms", 1], 1: [100, "%", 1] };
+
 const size = (one) =>
+  // each parameter as people say it, ± half of its 95 % interval
   Object.entries(one.parameters || {})
-    .map(
-      ([key, value]) =>
-        `${words(key)} ${[value.value]
+    .map(([key, { value, sd, unit }]) => {
+      const [factor, called, digits] = SHOWN[unit] || [1, unit || "", 2];
+      const said = (some, scale) =>
+        [some]
           .flat()
-          .map((x) => number(x, 3))
-          .join("; ")} ${value.unit === "1" ? "" : value.unit || ""}`,
-    )
-    .join(", ");
+          .map((x) => number(x === null ? null : scale * x, digits).replace("-", "−"))
+          .join(", ");
+      const known = [sd].flat().some((x) => Number.isFinite(x));
+      return `${words(key)} ${said(value, factor)}${known ? ` ± ${said(sd, 1.96 * factor)}` : ""} ${called}`.trim();
+    })
+    .join("; ");
 
 function shownMarkers(one, { name, view }) {
   // where a finding is about labels, the way to where they are exchanged
@@ -143,35 +155,131 @@ function shownMarkers(one, { name, view }) {
 }
 
 function findings(rows, all) {
+  const place = h("div", { "aria-live": "polite" }),
+    able = rows.filter((one) => one.session_entry);
+  const button = (some, text) =>
+    h(
+      "button",
+      { onclick: () => correction(place, some, all), "data-key": `correct ${some.map((one) => one.target).join(" ")}` },
+      text,
+    );
+  return [
+    h(
+      "table",
+      { cls: "stack" },
+      h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          ["Cause", "Size", "Probability", "What to do"].map((one) => h("th", { scope: "col" }, one)),
+        ),
+      ),
+      h(
+        "tbody",
+        {},
+        rows.map((one) =>
+          h(
+            "tr",
+            {},
+            h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
+            h("td", { "data-label": "Size" }, size(one)),
+            h(
+              "td",
+              { cls: "n", "data-label": "Probability" },
+              one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
+            ),
+            h(
+              "td",
+              { "data-label": "What to do" },
+              one.advice || "",
+              " ",
+              shownMarkers(one, all),
+              one.session_entry ? button([one], corrects(one)) : "",
+            ),
+          ),
+        ),
+      ),
+    ),
+    able.length > 1 ? h("div", { cls: "bar" }, button(able, `Correct all ${able.length} …`)) : "",
+    place,
+  ];
+}
+
+function corrects(one) {
+  // what the button beside a finding does
+  const [first, last] = (one.target || "").split("/"),
+    where = one.trials?.length ? one.trials.join(", ") : "all recordings";
+  if (one.session_entry === "exchange") return `Exchange ${first} and ${last} in ${where} …`;
+  if (one.session_entry === "channels") return `Exchange the channels of ${first} and ${last} …`;
+  return "Take the mass that the plates weighed …";
+}
+
+async function correction(place, some, { name, edit, page }) {
+  // what session.toml would say, before and after first; then it is written and the session run again
+  place.replaceChildren(h("p", {}, "Working out before and after …"));
+  try {
+    const told = await tell("correction", { name, findings: some.map((one) => `${one.effect} ${one.target}`) });
+    const write = async () => {
+      if (!(await edit(...told.changes))) return;
+      page.run = (await tell("run", { names: [name] })).run;
+      await page.refresh();
+    };
+    place.replaceChildren(
+      residuals(told.residuals),
+      h(
+        "p",
+        { cls: "small" },
+        "What session.toml would say: ",
+        told.changes.map(([keys, value]) => [h("code", {}, `${keys.join(".")} = ${JSON.stringify(value)}`), " "]),
+        "(Undo takes it back; your recordings stay as they are).",
+      ),
+      h(
+        "button",
+        { cls: "main", "data-key": "write", onclick: () => write().catch((error) => say(error.message)) },
+        "Write this and run again",
+      ),
+    );
+  } catch (error) {
+    say(error.message);
+    place.replaceChildren();
+  }
+}
+
+function residuals(rows) {
+  // what plates and simulation differ by, and the markers from the body, before and after
+  if (!rows.length) return "";
+  const kinds = [...CHANNELS, "Markers (mm)"];
+  const line = (one, when) =>
+    h(
+      "tr",
+      {},
+      h("th", { scope: "row" }, one.trial),
+      h("td", { "data-label": "When" }, when),
+      one[when].map((x, k) => h("td", { cls: "n", "data-label": kinds[k] }, number(x, 1))),
+    );
   return h(
     "table",
-    { cls: "stack" },
+    { cls: "stack compared" },
+    h(
+      "caption",
+      {},
+      "What plates and simulation differ by (RMS; N, N·m), and markers and body, as it is and corrected",
+    ),
     h(
       "thead",
       {},
       h(
         "tr",
         {},
-        ["Cause", "Size", "Probability", "What to do"].map((one) => h("th", { scope: "col" }, one)),
+        ["Recording", "When", ...kinds].map((one) => h("th", { scope: "col" }, one)),
       ),
     ),
     h(
       "tbody",
       {},
-      rows.map((one) =>
-        h(
-          "tr",
-          {},
-          h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
-          h("td", { "data-label": "Size" }, size(one)),
-          h(
-            "td",
-            { cls: "n", "data-label": "Probability" },
-            one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
-          ),
-          h("td", { "data-label": "What to do" }, one.advice || "", " ", shownMarkers(one, all)),
-        ),
-      ),
+      rows.flatMap((one) => [line(one, "before"), line(one, "after")]),
     ),
   );
 }
@@ -199,39 +307,8 @@ function acceptance({ name, page }, found) {
     try {
       const told = await tell("accept", { name });
       corrected = told.written.some((one) => one.file.startsWith("corrected/"));
-      const head = ["Recording", "", ...CHANNELS].map((one) =>
-        h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
-      );
-      const line = (one, when) =>
-        h(
-          "tr",
-          {},
-          h("th", { scope: "row" }, one.trial),
-          h("td", {}, when),
-          one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
-        );
       place.replaceChildren(
-        told.residuals.length
-          ? h(
-              "div",
-              { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
-              h(
-                "table",
-                {},
-                h(
-                  "caption",
-                  {},
-                  "What plates and simulation differ by (RMS; N, N·m) as recorded, and with what was found taken off",
-                ),
-                h("thead", {}, h("tr", {}, head)),
-                h(
-                  "tbody",
-                  {},
-                  told.residuals.flatMap((one) => [line(one, "before"), line(one, "after")]),
-                ),
-              ),
-            )
-          : "",
+        residuals(told.residuals),
         told.written.length
           ? h(
               "div",
@@ -261,7 +338,11 @@ function acceptance({ name, page }, found) {
   return h(
     "div",
     {},
-    h("div", { cls: "bar" }, h("button", { onclick: look, "data-key": "accept" }, "Accept … show before and after")),
+    h(
+      "div",
+      { cls: "bar" },
+      h("button", { onclick: look, "data-key": "accept" }, "Accept all, in copies … show before and after"),
+    ),
     place,
   );
 }

@@ -24,11 +24,26 @@ export async function showSession(main, page, name, tab) {
   document.title = `${name} · biodance`;
   Object.assign(page, { name, revision: view.revision });
   page.refresh = async () => showSession(main, page, name, tab);
-  const changed = async (path, more = {}) => {
+  const changed = (path, more = {}) => {
+    // one after the other: who is faster than the answer loses nothing, unless both change the same key
+    const keys = (more.changes || []).map(([key]) => key.join("/")),
+      seen = page.revision,
+      apart = keys.length && !keys.some((key) => page.waiting.has(key));
+    keys.forEach((key) => page.waiting.add(key));
+    page.busy += 1;
+    page.queue = page.queue
+      .then(() => change(path, more, apart ? page.revision : seen))
+      .finally(() => {
+        page.busy -= 1;
+        keys.forEach((key) => page.waiting.delete(key));
+      });
+    return page.queue;
+  };
+  const change = async (path, more, revision) => {
     // a change of session.toml; what is then shown is what was read again
     try {
       say("");
-      const found = await tell(path, { name, revision: page.revision, ...more });
+      const found = await tell(path, { name, revision, ...more });
       if (page.name === name) page.revision = found.revision;
       if (turn === page.turn) await draw((view = found));
       else if (page.name === name) await page.refresh(); // somebody went to another tab meanwhile
@@ -43,6 +58,7 @@ export async function showSession(main, page, name, tab) {
   const edit = (...changes) => changed("edit", { changes });
   const run = async () => {
     try {
+      await page.queue; // what was changed just now is a part of it
       page.run = (await tell("run", { names: [name] })).run;
       await page.refresh();
     } catch (error) {

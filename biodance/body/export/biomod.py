@@ -8,8 +8,8 @@ frame. The root moves by translations x y z and rotations x y z (body-fixed) in 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import link_names, plain_name, row
-from biodance.body.inertia import rigid_inertia
+from biodance.body.export import link_names, plain_name, row
+from biodance.body.parts import rigid_inertia
 from biodance.records import Array
 
 FORMAT = "biomod"

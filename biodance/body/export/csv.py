@@ -11,7 +11,7 @@ import io
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import rigid_inertia
+from biodance.body.parts import rigid_inertia
 from biodance.lab.plain_text import for_spreadsheet
 from biodance.records import Array
 

@@ -9,7 +9,7 @@ registry.khronos.org/glTF.
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import WORLD, segment_tree
+from biodance.body.export import WORLD, segment_tree
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError
 from biodance.records import side_in_name

@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import WORLD, Branch, add, row, segment_tree, six, xml_document
-from biodance.body.inertia import rigid_inertia
+from biodance.body.export import WORLD, Branch, add, row, segment_tree, six, xml_document
+from biodance.body.parts import rigid_inertia
 
 FORMAT = "mjcf"
 SUFFIX = ".xml"

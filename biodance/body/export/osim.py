@@ -12,9 +12,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import WORLD, Branch, add, plain_name, row, segment_tree, six, xml_document
-from biodance.body.inertia import rigid_inertia
-from biodance.body.parts import UPRIGHT
+from biodance.body.export import WORLD, Branch, add, plain_name, row, segment_tree, six, xml_document
+from biodance.body.parts import UPRIGHT, rigid_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.errors import BiodanceError
 from biodance.records import Array

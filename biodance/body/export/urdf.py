@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import add, link_names, row, xml_document
-from biodance.body.inertia import rigid_inertia
+from biodance.body.export import add, link_names, row, xml_document
+from biodance.body.parts import rigid_inertia
 from biodance.records import Array
 
 FORMAT = "urdf"

@@ -279,6 +279,12 @@ def _marker_leg(place: Mapping[str, Array], side: str) -> float:
     return float(np.linalg.norm(asis - knee) + np.linalg.norm(knee - ankle))
 
 
+def _bent(place: Mapping[str, Array], side: str) -> bool:
+    """Return whether somebody sits: from the pelvis to the knee a leg goes ahead farther than down."""
+    asis, knee = (place[f"{side}_{name}"] for name in ("asis", "knee_lateral"))
+    return bool(np.hypot(*(knee - asis)[:2]) > asis[2] - knee[2])
+
+
 def _contradicted(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> tuple[dict[str, str], str]:
     """Return the typed lengths of legs that the markers contradict, by their name in ``given``, and what to do; and a
     warning where they contradict the typed width of the pelvis, of which the markers' is used anyway ("" if not).
@@ -286,7 +292,8 @@ def _contradicted(given: Mapping[str, float], width: float, place: Mapping[str, 
     legs = {
         name.lower(): f"{NOT_USED}{said}"
         for side, name in ((side, f"{letter}LegLength") for side, letter in _LETTER.items())
-        if (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
+        if not _bent(place, side)
+        and (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
     }
     said = _unlike("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)
     return legs, f"{WARNING}{said}" if said else ""

@@ -10,13 +10,13 @@ import numpy as np
 
 from biodance.body.human.scan import ScannedBody, cut_scan, read_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
-from biodance.body.inertia import TENSOR, RigidInertia
+from biodance.body.parts import TENSOR, RigidInertia
 from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table, row_numbers
 from biodance.body.tables.choice import PARTS, reference, studies, study_masses
 from biodance.body.tables.choice import parts as table_parts
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import SessionRefused
-from biodance.lab.shape import legal_girths, usual_girths
+from biodance.lab.session.file import legal_girths, usual_girths
 from biodance.records import SIDES, Array, FootSizes, Subject
 
 WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of, upright_to
-from biodance.body.inertia import RigidInertia, combine_inertias, turn_inertia
+from biodance.body.parts import RigidInertia, combine_inertias, turn_inertia
 from biodance.body.solids import read_mesh
 from biodance.body.tables.anthropometry import read_table
 from biodance.errors import FileRefused, SessionRefused

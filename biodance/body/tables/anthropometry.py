@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from biodance.body.inertia import RigidInertia
+from biodance.body.parts import RigidInertia
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters, smallest_eigenvalues
+from biodance.body.parts import RigidInertia, combine_inertias, inertial_parameters, smallest_eigenvalues
 from biodance.body.tables.anthropometry import COUNT, KINDS, Reference, Sex, normalised_person, proportion
 from biodance.body.tables.segment_data import FAMILY, SegmentTable, read_segment_table
 from biodance.errors import BiodanceError, FileRefused, UnknownName, known_index
@@ -126,7 +126,7 @@ def _foot(sex: Sex) -> RigidInertia:
 def dumas(subject: Subject) -> Reference:
     """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder in de Leva's proportion."""
     sex = subject.sex
-    height, forearm = _dumas_stature(sex), _dumas_length("forearm", sex)
+    height, forearm = float(_dumas_table().provenance["reference_stature_m"][sex]), _dumas_length("forearm", sex)
     lengths = {kind: _dumas_length(kind, sex) for kind in ("pelvis", "thigh", "shank", "upper_arm")}
     lengths |= {"forearm_hand": forearm, "foot": proportion("foot_length", sex) * height}
     lengths["trunk_head"] = length("trunk_3", sex) / _de_leva_stature(sex) * height
@@ -134,11 +134,6 @@ def dumas(subject: Subject) -> Reference:
     lumps["forearm_hand"] = combine_inertias(_dumas_lump("forearm", sex), _dumas_lump("hand", sex, -forearm))
     lumps["trunk_head"] = combine_inertias(*_trunk_parts(sex)[1:])
     return normalised_person("dumas_2018", height, lengths, {"pelvis": _trunk_parts(sex)[0], **lumps})
-
-
-def _dumas_stature(sex: Sex) -> float:
-    """Return the stature of the reference person, m."""
-    return float(_dumas_table().provenance["reference_stature_m"][sex])
 
 
 @cache

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.inertia import rigid_inertia
-from biodance.body.parts import GRAVITY
+from biodance.body.parts import GRAVITY, rigid_inertia
 from biodance.dance.problem.stance import Stance, support_depth
 from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import Poses, poses

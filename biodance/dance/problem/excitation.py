@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.state import State
 from biodance.identification.base_parameters import structural_base

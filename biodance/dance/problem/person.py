@@ -261,6 +261,10 @@ _WORDS = ("reason", "care", "cannot", "hold_frame", "stand_alone_on", "seated")
 _KEYS = (*_WORDS, "max_speed_deg_s", "seat_height_m", "rest_after_s", *_TABLES)
 _OVERHEAD = "lift arms over shoulder height"
 _CANNOT = ("stand", *(f"stand on {side} leg" for side in SIDES), "turn", _OVERHEAD)
+GRADES = {"grade 5": 1.0, "grade 4": 0.6, "grade 3": 0.25}
+"""Share of the usual strength by the grade of a manual muscle test: 4 holds against some resistance, 3 against none but
+gravity.
+"""
 _RIGHT_ANGLE = math.pi / 2
 _SEAT = (0.3, 1.2)
 """m that a seat may be high."""
@@ -326,7 +330,7 @@ def read_person(path: str | Path) -> PersonLimits:
         left_hip_internal_rotation = 0            names of the ISB do as well
         [weight_bearing]                          share of the weight that a leg may bear
         left = 0.6
-        [strength]                                share of the usual strength
+        [strength]                                share of the usual strength, or a grade: "grade 4" of 5
         left_arm = 0.5
         [range_share]                             share of the usual range, towards the upright posture
         left = 0.7
@@ -346,8 +350,13 @@ def read_person(path: str | Path) -> PersonLimits:
     BiodanceError
         The file cannot be read, or a value is not legal; the message names file, key, value and what would be legal.
     """
-    path = Path(path)
-    raw = read_toml(path)
+    return limits_in(read_toml(Path(path)), Path(path))
+
+
+def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
+    """Return the limits that the content of such a file says, and raise as `read_person` does; ``path`` by which
+    messages call it.
+    """
     for key in raw:
         if key not in _KEYS:
             raise UnknownName.of(f"key of {path}", key, _KEYS)
@@ -448,19 +457,28 @@ def _ranges(path: Path, raw: dict[str, Any]) -> _Ranges:
 
 
 def _shares(path: Path, raw: dict[str, Any], name: str) -> Shares:
-    found = tuple(
-        (plain(key), finite_number(path, f"{name}.{key}", value)) for key, value in table(path, raw, name).items()
-    )
+    given = table(path, raw, name)
+    if name == "strength":
+        given = {key: _graded(path, key, value) for key, value in given.items()}
+    found = tuple((plain(key), finite_number(path, f"{name}.{key}", value)) for key, value in given.items())
     for key, value in found:
         if not 0 <= value <= 1:
             raise BiodanceError(f"{path}: {name}.{key} = {value:g}; a share lies between 0 and 1.")
     return found
 
 
+def _graded(path: Path, key: str, value: object) -> object:
+    """Return the share of a grade of strength, anything else as it is."""
+    if isinstance(value, str) and value not in GRADES:
+        raise BiodanceError(
+            f"{path}: strength.{key} = {value!r}; expected a share from 0 to 1, or {', '.join(GRADES)}. A limb of less "
+            f"does not hold itself up: say 0 of its movements under at_most_deg."
+        )
+    return GRADES[value] if isinstance(value, str) else value
+
+
 def moved_joints(key: str, where: str) -> tuple[tuple[str, int], ...]:
-    """Return the joints, with the side if ``key`` names one, and senses of a movement; UnknownName, found ``where``, if
-    there is none of this name.
-    """
+    """Return the joints, with their side if named, and senses of a movement; UnknownName, found ``where``, if none."""
     moved = named_movement(key)
     if moved is None:
         raise UnknownName.of(f"movement in {where}", key, (*_MOVES, *_JOINTS))

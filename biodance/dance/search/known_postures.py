@@ -85,6 +85,10 @@ _HANGING = Word(
 )
 """What an arm does that is asked for nothing: beside the body, and as far from it as clothes need."""
 
+_FREE_ARM = "{} arms as in the picture"
+IN_PART = "as far as you may"
+"""What is added to the name of a word that this person can do in part."""
+
 Vocabulary = dict[str, tuple[Word, ...]]
 """Group: its words, the one for rest first."""
 
@@ -113,6 +117,18 @@ def read_vocabulary() -> Vocabulary:
             raise BiodanceError(f"{path}: {group} names the mirror image {lost[0]!r}, which is not there.")
         found[group] = tuple(words)
     return found
+
+
+def posture_phrases() -> tuple[str, ...]:
+    """Return all words of limbs of which names of postures are made, those of paired limbs of both and of each; what a
+    limb does of which nothing is asked is not named.
+    """
+    texts = [word.text for group in read_vocabulary().values() for word in group if not word.rest]
+    sides = ("both", *(f"the {side}" for side in SIDES))
+    out = ["stand", "sit"]
+    for text in (*texts, _FREE_ARM):
+        out += [singular(text.format(side)) if side != "both" else text.format(side) for side in sides]
+    return tuple(dict.fromkeys(out))
 
 
 def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
@@ -198,7 +214,7 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     for number, k in enumerate(chosen, start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
         key = f"free_{number}"
-        out.append(Word(key, "{} arms as in the picture", angles, key))
+        out.append(Word(key, _FREE_ARM, angles, key))
     return tuple(out)
 
 
@@ -218,7 +234,7 @@ def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
         return None
     named, within = dict(word.angles), _within(body, plan, part, word)
     if not word.rest and any(abs(within[joint] - angle) > _CUT for joint, angle in named.items()):
-        name = f"{word.text}, as far as you may"
+        name = f"{word.text}, {IN_PART}"
         word = replace(word, key=f"{word.key}_in_part", text=name, mirror=f"{word.mirror}_in_part")
     return replace(word, angles=tuple((joint, angle) for joint, angle in within.items() if angle or joint in named))
 

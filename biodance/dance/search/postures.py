@@ -303,8 +303,8 @@ RUNS = 2
 """Independent searches whose postures are put together."""
 SWEEPS = ((4, 20), (4, 10))
 """Sharpness of the smooth condition number and iterations for every posture, of the sweeps of a run."""
-FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
-"""The same for the sweeps after the exchange, first one from fresh starts, then from where the postures are."""
+FRESH, POLISH = ((8, 20), (8, 20)), ((8, 10), (8, 10), (16, 10), (32, 8))
+"""The same for the sweeps after the exchange, first two from fresh starts, then from where the postures are."""
 
 APART = np.radians(10.0)
 """rad: two postures on the same feet differ by this much in one joint at least; less nobody would see."""

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.motion.newton import trunk_of
-from biodance.motion.quiet_standing import facing
+from biodance.motion.newton import facing, trunk_of
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
 

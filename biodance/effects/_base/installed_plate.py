@@ -1,4 +1,4 @@
-"""A cause in an installed plate whose formula is that of `lab.plates.faults`: what it adds to the predicted wrench."""
+"""A cause in an installed plate whose formula is that of `lab.corrections`: what it adds to the predicted wrench."""
 
 from abc import ABC
 from typing import ClassVar
@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
-from biodance.lab.plates.faults import PlateFault
+from biodance.lab.corrections import PlateFault
 from biodance.records import Array
 from biodance.spatial import wrench_about_origin
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
-from biodance.body.inertia import TENSOR
+from biodance.body.parts import TENSOR
 from biodance.lab.prepare import LowPass, low_pass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, place_jacobian
 from biodance.records import Array

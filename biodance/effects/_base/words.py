@@ -17,12 +17,23 @@ class About:
     settled_by: str = ""
 
 
+class SessionEntry(StrEnum):
+    """What of session.toml takes a cause off."""
+
+    EXCHANGE = "exchange"
+    """Labels exchanged, in the trials and spans where they are."""
+    CHANNELS = "channels"
+    """Channels of two plates exchanged, in all trials."""
+    MASS = "mass_kg"
+    """The mass as weighed."""
+
+
 @dataclass(frozen=True)
 class CauseWords:
     """How a cause is told: the ``fact`` about {it} with its {size} and the interval {between}, {more} where it is
     positive, {opposite} the other side; what to ``do``; its name as an ``alternative``; the two words of {more};
     ``signs`` what a positive and a negative size mean where the number stands alone; ``places`` what {it} is called by
-    the end of its target, where that is not its name.
+    the end of its target, where that is not its name; what of session.toml takes it off (``entry``; None = nothing).
     """
 
     fact: str
@@ -31,6 +42,7 @@ class CauseWords:
     more: tuple[str, str] = ("", "")
     signs: tuple[str, str] = ("", "")
     places: Mapping[str, str] = field(default_factory=dict)
+    entry: SessionEntry | None = None
 
     def called(self, target: str) -> str:
         """Return the target as it is told: ``left leg below the knee``; unchanged where it has no name of its own."""

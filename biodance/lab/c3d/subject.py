@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.c3d.emg import EmgEnvelope, emg_envelopes, muscle_of
 from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label
@@ -31,15 +32,22 @@ class FileEvent:
 
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time; ``program`` that wrote them, or ""."""
+    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time; ``program`` that wrote them, or ""; what
+    the muscles did (``emg``).
+    """
 
     angles: Mapping[str, Array]
     events: tuple[FileEvent, ...]
     program: str = ""
+    emg: tuple[EmgEnvelope, ...] = ()
+
+
+NO_OUTPUTS = FileOutputs({}, ())
+"""Of a file that holds nothing of other programs."""
 
 
 def read_outputs(path: str | Path) -> FileOutputs:
-    """Return the joint angles and foot events of a C3D file; empty where it holds none.
+    """Return the joint angles, foot events and muscle activity of a C3D file; empty where it holds none.
 
     Raises
     ------
@@ -52,14 +60,16 @@ def read_outputs(path: str | Path) -> FileOutputs:
     degrees = 180 / np.pi if unit.lower().startswith("rad") else 1.0
     names = [split_label(label)[1] for label in point_labels(parameters, layout)]
     columns = {name: column for column, name in enumerate(names) if name in listed or name.endswith("Angles")}
-    angles = {}
-    if columns:
-        points, _ = read_numbers(content, layout)
+    channels = texts(parameters, "ANALOG", "LABELS")[: layout.channels]
+    angles, emg = {}, tuple[EmgEnvelope, ...]()
+    if columns or any(map(muscle_of, channels)):
+        points, analog = read_numbers(content, layout)
+        emg = emg_envelopes(analog, layout.analog_rate, channels, texts(parameters, "ANALOG", "UNITS"))
         for name, column in columns.items():
             value = degrees * points[:, column]
             angles[name] = np.where((value != 0).any(axis=1)[:, None], value, np.nan)
     said = [*texts(parameters, "MANUFACTURER", "SOFTWARE"), *texts(parameters, "MANUFACTURER", "COMPANY")]
-    return FileOutputs(angles, _events(parameters, layout), " ".join(said[:1]))
+    return FileOutputs(angles, _events(parameters, layout), " ".join(said[:1]), emg)
 
 
 def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:

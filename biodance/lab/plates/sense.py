@@ -31,6 +31,10 @@ _QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0
 _BESIDE = 0.15  # m beyond the edge
 _FRAMES = 200
 _UNDER_THE_FOOT, _NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
+_HANGING = 0.09
+"""m over the plate: of a foot that stands there is a lower marker, at the ankle if at nothing else; who sits on the
+plate lets them hang higher.
+"""
 
 _SWAY_BAND = (0.5, 5.0)  # Hz
 _SWAY_TIME = 2.5  # s of standing that the sway test needs
@@ -437,6 +441,8 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
     seen = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
     if seen.sum() < max(1, min(5, len(cop))):
+        return None
+    if np.median(np.nanmin(np.where(near, xyz[:, :, 2], np.nan)[seen], axis=1)) - centre[2] > _HANGING:
         return None
     point, near, feet = cop[seen], near[seen], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[seen]
     # the markers near the plate first, so that no more columns are left than feet were ever seen there

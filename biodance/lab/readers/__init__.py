@@ -1,16 +1,25 @@
 """FAMILY: one recording format per file, found automatically; other packages join by the entry points
-``biodance.readers``.
+``biodance.readers``. One door for every recording: a file is given to the reader whose ``sniff`` knows its head (of
+several to the one that also has its extension, else to the preferred one); where none does, to the one that has its
+extension.
 
-A file is given to the reader whose ``sniff`` knows its head (of several to the one that also has its extension, else to
-the preferred one); where none does, to the one that has its extension.
+Markers at (0, 0, 0) were not seen, whatever the format: no marker of a person lies on the origin to the last digit.
+Nor were frames that carry the markers of the frame before to the last digit (`without_frozen`).
 """
 
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 from biodance.discovery import Chosen, Family, missing_of
+from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.markers.sets import MarkerSet, wearing
+from biodance.lab.markers.signals import unseen_at_origin, without_frozen
 from biodance.lab.plain_text import decode
+from biodance.lab.plates.corners import Told, as_told
+from biodance.library import refuse_special
 from biodance.records import Role, Trial
 
 
@@ -69,3 +78,152 @@ def head_text(head: bytes) -> str:
         return decode(head, Path()).lstrip()
     except ValueError:
         return ""
+
+
+def _without_origin(trial: Trial) -> Trial:
+    """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
+    if trial.markers is None:
+        return trial
+    xyz, said = unseen_at_origin(trial.markers.xyz)
+    return replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said)) if said else trial
+
+
+_SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
+_HEAD = 8192  # Bytes of a file that are looked at to find its reader
+
+
+def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
+    """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its
+    extension.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, empty, no ordinary file, subject data instead of a recording, or of no known format; the
+        message lists the legal formats.
+    """
+    path = Path(path)
+    head = read_head(path)
+    found = sniffed(path, head, chosen)
+    if found:
+        return found
+    extension, legal = path.suffix.lower(), extensions(chosen)
+    data = _subject_data(head)
+    if data or extension in _SUBJECT_DATA:
+        raise FileRefused(
+            f"{path}: holds {_SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with "
+            f"the trials."
+        )
+    if extension in legal:
+        return legal[extension]
+    raise FileRefused(f"{path}: its content is none of the formats that can be read. Legal are {', '.join(legal)}.")
+
+
+def read_head(path: Path) -> bytes:
+    """Return the first `HEAD` bytes of a file.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, empty, cannot be opened, or is none: a folder, a pipe, a device.
+    """
+    if path.is_dir():
+        raise FileRefused(f"{path}: is a folder, a file is expected. Point at one recording.")
+    refuse_special(path)
+    try:
+        with open(path, "rb") as stream:
+            head = stream.read(_HEAD)
+    except OSError as error:
+        raise FileRefused(
+            f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights."
+        ) from error
+    if not head:
+        raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
+    return head
+
+
+def sniffed(path: Path, head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
+    """Return the reader that knows the head of a file, of several the one that has its extension; None if none does."""
+    known = [reader for reader in readers(chosen) if reader.sniff(head)]
+    return next((reader for reader in known if path.suffix.lower() in reader.EXTENSIONS), known[0] if known else None)
+
+
+def read_trial(
+    path: str | Path,
+    *,
+    role: Role = "fit",
+    subject: str | None = None,
+    readers: Chosen[Reader] = None,
+    markers: MarkerSet | None = None,
+    told: Told | None = None,
+) -> Trial:
+    """Read the trial in a file of any format.
+
+    The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf,
+    stem_forces).
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        One recording.
+    role : {"fit", "static", "validate", "check", "skip"}
+        What it is for.
+    subject : str, optional
+        Chooses the person in a C3D file that holds several.
+    readers : iterable, optional
+        Objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
+    markers : MarkerSet, optional
+        The set that was worn; by default the known set whose labels are there.
+    told : Told, optional
+        What the analyst says of the plates and of the body mass; it comes before what the file says.
+
+    Returns
+    -------
+    Trial
+        In m, N, N·m, z up; ``history`` and ``warnings`` say what was decided.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read or cannot be trusted, or its format is unknown; the message lists the legal formats.
+
+    See Also
+    --------
+    read_session : A whole folder, with the subject.
+
+    Examples
+    --------
+    >>> biodance.read_trial("visit/squat_1.c3d").source.format
+    'C3D'
+    """
+    path = Path(path)
+    reader = reader_of(path, chosen=readers)
+    try:
+        trial = without_frozen(_without_origin(_read(reader, path, role, subject, told)))
+        return wearing(trial, markers) if markers else trial
+    except BiodanceError:
+        raise
+    except Exception as error:
+        raise FileRefused(
+            f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are "
+            f"not affected."
+        ) from error
+
+
+def _read(reader: Reader, path: Path, role: Role, subject: str | None, told: Told | None) -> Trial:
+    """Return the trial as its reader reads it, with what is ``told``."""
+    if told is None:
+        return reader.read(path, role=role, subject=subject)
+    if getattr(reader, "FOLLOWS_TOLD", False):
+        return reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
+    return as_told(reader.read(path, role=role, subject=subject), told)
+
+
+def _subject_data(head: bytes) -> str:
+    """Return the extension of the subject data that a head shows; "" for none."""
+    text = head_text(head)
+    if "<KinematicModel" in text:
+        return ".vsk"
+    if re.match(r"\[[\w ]+\]\s*$", text.splitlines()[0] if text else ""):
+        return ".enf"
+    return ".mp" if re.match(r"\$\w+\s*=", text) else ""

@@ -10,9 +10,9 @@ import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.markers.time_axis import time_axis
-from biodance.lab.opensim_tables import Y_UP_TO_Z_UP, TimeTable, read_mot
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.decode import find_baseline
+from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, read_mot
 from biodance.lab.readers import head_text
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import COP_FORCE

@@ -13,7 +13,6 @@ from biodance.lab.markers.sets import recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import resampled, time_axis
 from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
-from biodance.lab.opensim_tables import Y_UP_TO_Z_UP, TimeTable, columns_of, read_mot
 from biodance.lab.plain_text import (
     COMMAS_READ,
     cells,
@@ -24,6 +23,7 @@ from biodance.lab.plain_text import (
     with_points,
     write_whole,
 )
+from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, columns_of, read_mot
 from biodance.lab.readers import head_text
 from biodance.lab.readers.mot import has_plates, plates_of, plates_rate
 from biodance.records import Array, Markers, Role, Source, Trial

@@ -13,11 +13,12 @@ from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.plates.corners import one_place
-from biodance.lab.read import read_trial
-from biodance.lab.readers import Reader, extensions
+from biodance.lab.readers import Reader, extensions, read_trial
 from biodance.lab.session.archive import visit_date
+from biodance.lab.session.entries import unused_labels, with_parts_corrected
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
 from biodance.lab.session.recordings import (
+    EclipseNotes,
     decimal_commas,
     each_once,
     find_recordings,
@@ -30,9 +31,7 @@ from biodance.lab.session.recordings import (
     role_by_name,
     vicon_notes,
 )
-from biodance.lab.session.spans import unused_labels, with_parts_corrected
 from biodance.lab.session.subject import identify_subject
-from biodance.lab.vicon import EclipseNotes
 from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
 from biodance.threads import one_thread

@@ -21,8 +21,8 @@ from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
+from biodance.lab.session.entries import plate_lines
 from biodance.lab.session.file import FILES
-from biodance.lab.session.plate_entry import plate_lines
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
@@ -218,7 +218,11 @@ def write_registered(
     with whole_folder(folder, over=True) as part:
         _write_registered(part, session, trial, (markers, recordings, rate))
         (part / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-        for file in _not_ours(folder):
+        # What lies in the folder of an earlier registration and was not written by it.
+        inside = sorted(folder.iterdir()) if folder.is_dir() else []
+        for file in [
+            one for one in inside if one.is_dir() or not (one.suffix == ".c3d" or one.name in (*FILES, _MARK))
+        ]:
             if not (part / file.name).exists():
                 shutil.copy2(file, part / file.name) if file.is_file() else shutil.copytree(file, part / file.name)
     return path
@@ -252,12 +256,6 @@ def _take_plates_out(path: Path) -> None:
     """Take the tables ``[plates.NAME]`` out of a copied file: they are about plates as they were before."""
     text = path.read_text(encoding="utf-8")
     path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
-
-
-def _not_ours(folder: Path) -> list[Path]:
-    """Return what lies in the folder of an earlier registration and was not written by it."""
-    inside = sorted(folder.iterdir()) if folder.is_dir() else []
-    return [one for one in inside if one.is_dir() or not (one.suffix == ".c3d" or one.name in (*FILES, _MARK))]
 
 
 def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[PlateRecording], float]:

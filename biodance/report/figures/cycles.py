@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from biodance.cycles.beside import EMG
 from biodance.cycles.curves import CurveGroup, NormalCurve
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.summary import Repetitions
@@ -50,7 +51,12 @@ _BOTH: Mapping[str, str] = {
 }
 """The same where both sides move alike."""
 GROUND_PANELS = ("ground_reaction_up", "ground_reaction_forward", "ground_reaction_inward")
-CYCLE_AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
+CYCLE_AXES = {
+    "gait": "% of the gait cycle",
+    "squat": "% of the squat",
+    "sit_to_stand": "% of the rise",
+    "jump": "% of the jump, landing included",
+}
 _CONSISTENT = (
     *("hip_flexion_range", "knee_flexion_maximum", "ankle_dorsiflexion_maximum"),
     *("pelvis_tilt_range", "ankle_dorsiflexion_moment_minimum", "ankle_power_maximum"),
@@ -96,7 +102,7 @@ def _offs(found: Repetitions) -> list[tuple[float, Stroke]]:
 
 def curve_title(group: CurveGroup) -> str:
     """Return what a panel of curves shows: quantity, unit, and which way is positive where the name does not say it."""
-    name = spaced(group.quantity)
+    name = spaced(group.quantity.removesuffix(EMG)) + " EMG" * group.quantity.endswith(EMG)
     sense = (POSITIVE if group.kind == "gait" else {**POSITIVE, **_BOTH}).get(group.quantity)
     return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
 

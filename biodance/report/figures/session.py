@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from biodance.body.solids import ROUNDNESS
 from biodance.display import BLACK, GREEN, GREY, YELLOW
 from biodance.identification.validation import TrialValidation
-from biodance.motion.quiet_standing import QuietStanding
+from biodance.motion.newton import QuietStanding
 from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures.style import SIDE_COLOURS

@@ -14,8 +14,8 @@ from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.provenance import Provenance, now
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import Provenance, now
 from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.report.figures.vector import (
     LEFT_SIDE,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.solids import segment_solids
-from biodance.dance.cues import dance_instructions, rests, skipping
+from biodance.dance.cues import Say, dance_instructions, in_english, rests, skipping
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
 from biodance.dance.problem.feet import plate_corners
@@ -19,10 +19,12 @@ from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.pipeline.dance_result import not_safe
-from biodance.pipeline.still import parent_segments
+from biodance.pipeline.dance import not_safe
+from biodance.pipeline.scenes import parent_segments
 from biodance.records import SIDES, Array, side_in_name
 from biodance.report.files import refuse_page, write_files
+from biodance.report.pages.dance_words import script_words
+from biodance.report.pages.language import ENGLISH, Language, read_language
 from biodance.report.pages.template import render, script_json, template_text, three_js
 from biodance.report.tables.schema import Schema
 from biodance.version import __version__
@@ -115,8 +117,8 @@ _FACTOR = 1e4
 """Steps a metre: positions are whole numbers of 0.1 mm."""
 
 
-def scene_of(dance: Dance) -> dict[str, Any]:
-    """Return what the page shows of a dance, as plain values.
+def scene_of(dance: Dance, say: Say = in_english) -> dict[str, Any]:
+    """Return what the page shows of a dance, as plain values, its words as one may ``say`` them.
 
     Returns
     -------
@@ -162,19 +164,19 @@ def scene_of(dance: Dance) -> dict[str, Any]:
         "poses": _packed(placed, "<i2"),
         "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4),
         "mark": dance.mark,
-        "still": "Sit still" if any(stance.seat for stance in dance.stances) else "Stand still",
-        "cues": _cues(dance),
+        "still": say("Sit still") if any(stance.seat for stance in dance.stances) else say("Stand still"),
+        "cues": _cues(dance, say),
     }
 
 
-def _cues(dance: Dance) -> list[dict[str, Any]]:
+def _cues(dance: Dance, say: Say) -> list[dict[str, Any]]:
     """Return of every posture: ``number`` as on the cue sheet, ``move_s`` when to begin to move, ``hold_s`` from when
     and ``end_s`` until when to stand still, ``calls`` what to do, ``after_skips`` the same where one, two, three
     postures before it are left out (as far as the feet stay where they are), ``can_half`` whether half of the way to it
     is a posture, too, ``rest`` whether the person rests after it, ``stance`` in words, ``feet`` the outlines of the
     planted soles (P, 2) m.
     """
-    said, pauses = dance_instructions(dance), rests(dance)
+    said, pauses = dance_instructions(dance, say), rests(dance)
     holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
     moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
     out = []
@@ -188,10 +190,12 @@ def _cues(dance: Dance) -> list[dict[str, Any]]:
                 "hold_s": held,
                 "end_s": holds[p].end if p in holds else held,
                 "calls": list(said[p]),
-                "after_skips": [list(skipping(dance, p, p - n)) for n in range(2, 5) if _same_feet(dance, p, p - n)],
+                "after_skips": [
+                    list(skipping(dance, p, p - n, say)) for n in range(2, 5) if _same_feet(dance, p, p - n)
+                ],
                 "can_half": _same_feet(dance, p, p - 1),
                 "rest": pauses[p],
-                "stance": stance_words(stance),
+                "stance": say(stance_words(stance)),
                 "feet": [_outline(stance, side) for side in stance.planted],
             }
         )
@@ -216,8 +220,11 @@ _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json"
 """What follows a person: parts of the bundle that `make bundle` writes into ``report/feedback``."""
 
 
-def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bool = False) -> bool:
-    """Write the page of a dance to ``path`` and return whether it follows the person (see `bundle`).
+def write_feedback(
+    dance: Dance, path: Path, *, force: bool = False, despite: bool = False, language: str | Path = ENGLISH
+) -> bool:
+    """Write the page of a dance to ``path``, in a ``language`` of `read_language`, and return whether it follows the
+    person (see `bundle`).
 
     Of one that imprecise people cannot dance safely only ``despite`` that; the page then says so on top.
 
@@ -232,9 +239,10 @@ def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bo
     unsafe = not_safe(dance)
     if unsafe and not despite:
         raise BiodanceError(f"{' '.join(unsafe)} Or give --despite: then there is a page, which says this on top.")
-    scene, carried = scene_of(dance), bundle()
+    words = read_language(language)
+    scene, carried = scene_of(dance, words.say), bundle()
     scene["follow"] = follow_scene(dance) if carried else None
-    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe, dance.care)
+    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe, dance.care, words)
     write_files(path.parent, {path.name: page})
     return scene["follow"] is not None
 
@@ -254,23 +262,31 @@ def feedback_page(
     carried: dict[str, str] | None,
     unsafe: tuple[str, ...] = (),
     care: tuple[str, ...] = (),
+    words: Language | None = None,
 ) -> str:
     """Return the page of a dance as HTML text: what it shows (`scene_of`), what follows the person, or None, in what
-    it is not safe, and what is to be taken care of.
+    it is not safe, what is to be taken care of, and in which language (None: English).
     """
     from markupsafe import Markup
 
+    words = words or read_language()
+    visit, following = template_text("visit.js"), template_text("follow_body.js") + template_text("follow.js")
+    program = template_text("feedback.js")
+    said = {} if words.tag == ENGLISH else script_words((program, visit, following), words.catalogue.gettext)
+
     return render(
         "feedback.html.j2",
+        language=words.tag,
+        say=words.say,
         name=spaced(name),
-        care=care,
+        care=[words.say(one) for one in care],
         unsafe=unsafe,
         version=__version__,
         style=Markup(template_text("feedback.css")),
-        program=Markup(template_text("feedback.js")),
-        visit=Markup(template_text("visit.js")),
+        program=Markup(program),
+        visit=Markup(visit),
         three=Markup(three_js()),
-        scene=Markup(script_json(scene)),
+        scene=Markup(script_json(scene | {"words": said})),
         bundle={key: Markup(value) for key, value in carried.items()} if carried else None,
-        following=Markup(template_text("follow_body.js") + template_text("follow.js")),
+        following=Markup(following),
     )

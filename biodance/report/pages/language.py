@@ -1,4 +1,5 @@
-"""The language of the subject's page: a catalogue of its sentences (gettext), and how numbers and dates are written.
+"""The language of a page for the person (the subject's, cards and page of a dance): a catalogue of its sentences
+(gettext), and how numbers and dates are written.
 
 English is what the code says. A catalogue is one text file, ``<language>.po``; a laboratory gives its own by its path,
 or offers it under the entry points ``biodance.languages``.
@@ -119,8 +120,8 @@ def _refuse_gaps(path: Path, found: Catalog) -> None:
             )
 
 
-_PLACE = re.compile(r"%(?:\(\w+\)s|.?)")
-"""What stands for a value in a sentence; also a per cent sign."""
+_PLACE = re.compile(r"%(?:\(\w+\)s|.?)|\{\}")
+"""What stands for a value or a limb in a sentence; also a per cent sign."""
 
 
 def _texts(said: str | list[str] | tuple[str, ...] | None) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from biodance.cycles.beside import EMG
 from biodance.cycles.curves import NormalCurve
 from biodance.cycles.keys import ANGLE_PANELS, GROUND_PEAKS, LOAD_PANELS
 from biodance.cycles.scores import SCORE_ANGLES, GaitScores
@@ -23,9 +24,9 @@ from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import FILE_ANGLE_ROW
 from biodance.report.wording import first_upper, format_number
 
-CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair"}
-_UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat"}
-_COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises"}
+CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair", "jump": "Jumps"}
+_UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat", "jump": "take-off"}
+_COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises", "jump": "jumps"}
 _BECAUSE = {
     LeftOutBecause.SHARED_PLATE: "in {n} both feet were on one plate for a part, which has no loads",
     LeftOutBecause.SPIKE: "{n} with a spike left out",
@@ -55,6 +56,7 @@ class MovementPart:
     angles: str
     loads: str
     ground: str
+    emg: str
     consistency: str
     trials: Sequence[str]
     values: Sequence[Row]
@@ -104,6 +106,7 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
         else tuple(one.name for one in found.keys if one.key == "range" and not one.middle)
     )
     ground = repetitions_figure(found, GROUND_PANELS, f"{title}: ground reaction, left beside right", normal)
+    muscles = tuple(dict.fromkeys(one.quantity for one in found.groups if one.quantity.endswith(EMG)))
     both, left, right = (found.spatiotemporal(side) for side in ("both", "left", "right"))
     values = [
         {"value": f"{spaced(name)} ({unit})"}
@@ -120,6 +123,7 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
         repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
         repetitions_figure(found, LOAD_PANELS, f"{title}: moments and powers, left beside right", normal),
         ground.removesuffix("</div></div>") + f"{pressure_figure(found)}</div></div>" if ground else "",
+        repetitions_figure(found, muscles, f"{title}: muscle activity, left beside right"),
         consistency_figure(found),
         found.trials,
         values,

@@ -22,7 +22,7 @@ class PlainMovement:
     picture: str
 
 
-_TITLES = {"squat": N_("How you squatted"), "sit_to_stand": N_("How you stood up")}
+_TITLES = {"squat": N_("How you squatted"), "sit_to_stand": N_("How you stood up"), "jump": N_("How you jumped")}
 _SIDES = {"right": N_("Right"), "left": N_("Left")}
 
 
@@ -32,7 +32,7 @@ def plain_movement(found: Repetitions, words: Language) -> PlainMovement:
         title = words.say("How you ran") if found.runs else words.say("How you walked")
         said, rows = _walk(found, words), _steps(found, words)
     else:
-        title, said, rows = words.say(_TITLES[found.kind]), [_counted(found, words)], []
+        title, said, rows = words.say(_TITLES[found.kind]), _counted(found, words), []
     keys = {one.name: one for one in found.keys}
     knee = keys.get("knee_flexion_maximum")
     if knee is not None and knee.right is not None and knee.left is not None:
@@ -42,15 +42,23 @@ def plain_movement(found: Repetitions, words: Language) -> PlainMovement:
     return PlainMovement(title, said, rows, _picture(found, words))
 
 
-def _counted(found: Repetitions, words: Language) -> str:
+def _counted(found: Repetitions, words: Language) -> list[str]:
     number = len(found.good)
     if found.kind == "squat":
-        return words.count("We saw %(number)s squat.", "We saw %(number)s squats.", number)
-    return words.count(
-        "We saw you stand up from the chair %(number)s time.",
-        "We saw you stand up from the chair %(number)s times.",
-        number,
-    )
+        return [words.count("We saw %(number)s squat.", "We saw %(number)s squats.", number)]
+    if found.kind == "jump":
+        height = words.number(100 * found.spatiotemporal()["height"].mean)
+        return [
+            words.count("We saw %(number)s jump.", "We saw %(number)s jumps.", number),
+            words.say("You went %(height)s cm up after your feet left the ground.", height=height),
+        ]
+    return [
+        words.count(
+            "We saw you stand up from the chair %(number)s time.",
+            "We saw you stand up from the chair %(number)s times.",
+            number,
+        )
+    ]
 
 
 def _walk(found: Repetitions, words: Language) -> list[str]:

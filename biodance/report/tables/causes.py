@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from biodance.effects import Cause, DiscreteEffect
 from biodance.report.tables.schema import Row, Schema
-from biodance.virtual_lab.faults.causes import CAUSES
+from biodance.virtual_lab.causes import CAUSES
 
 _PARAMETER = Schema("name unit typical")
 CAUSE_ROW = Schema(

@@ -25,7 +25,12 @@ _ALIAS = Schema("effect target log_bayes_factor")
 _GAIN = Schema("rms_before rms_after ci95 trials log_density_per_s=score log_density_se=score_se")
 FINDING_ROW = Schema(
     "effect target probability visible_fraction changes advice trials",
-    {"parameters": lambda one: _parameters(one.parameters), "set": _ALIAS, "gain": _GAIN},
+    {
+        "parameters": lambda one: _parameters(one.parameters),
+        "set": _ALIAS,
+        "gain": _GAIN,
+        "session_entry": lambda one: one.cause.words.entry if one.cause.words else None,
+    },
 )
 LIMIT_ROW = Schema(
     "effect target limit unit told_from typical",

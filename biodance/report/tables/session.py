@@ -10,8 +10,8 @@ from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.lab.prepare import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import Provenance
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS
 from biodance.report.tables.identification import (

@@ -2,6 +2,10 @@
 // The page that leads: what is shown is a function of one number, the second of the dance (negative: before it).
 const data = JSON.parse(document.getElementById("data").textContent);
 const by = (id) => document.getElementById(id);
+const say = (text, values = {}) => Object.entries(values).reduce((said, [name, value]) =>
+  said.replaceAll(`%(${name})s`, value), data.words?.[text] ?? text);
+const SIDES = ["left", "right"].map((side) => [side, (side === "left" ? say("left") : say("right")).split("|")]);
+const SIDE = new RegExp(`(\\b(?:${SIDES.flatMap(([, names]) => names).join("|")})\\b(?! angle))`);
 const LEAD = 5, SHARE = 0.5; // s to get ready; speed of the preview
 const COLOURS = { left: 0xd55e00, right: 0x0072b2, "": 0x8a8f94 };
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -180,9 +184,9 @@ function moment(second) {
 
 function words(text) {
   const item = document.createElement("li");
-  for (const part of text.split(/(\bleft\b|\bright\b(?! angle))/)) {
+  for (const part of text.split(SIDE)) {
     const span = document.createElement("span");
-    if (part === "left" || part === "right") span.className = part;
+    span.className = SIDES.find(([, names]) => names.includes(part))?.[0] ?? "";
     span.textContent = part;
     item.append(span);
   }
@@ -197,21 +201,23 @@ function tell(now) {
   if (key === told) return;
   told = key;
   const shown = cues[next], called = calls_of(next) ?? shown.calls;
-  const asked = now.phase === "end" || last ? [] : half.has(next) ? ["only half of the way:", ...called] : called;
-  by("number").textContent = now.phase === "end" ? "The end" : `${cues[now.cue].number} of ${cues.length}`;
-  by("stance").textContent = (now.phase === "hold" && !last ? "next: " : "") + shown.stance;
+  const asked = now.phase === "end" || last ? [] : half.has(next) ? [say("only half of the way:"), ...called] : called;
+  by("number").textContent = now.phase === "end" ? say("The end")
+    : say("%(number)s of %(count)s", { number: cues[now.cue].number, count: cues.length });
+  by("stance").textContent = (now.phase === "hold" && !last ? say("next:") + " " : "") + shown.stance;
   by("told").className = now.phase;
   let held_in = now.cue;
   while (held_in && left_out.has(held_in)) held_in--;
-  const back = `Take up posture ${cues[held_in].number} again. Next:`, hold = `${data.still}${last ? "" : ". Next:"}`;
-  by("now").textContent = pausing === "rest" ? "Rest. Let the arms down" : pausing === "back" ? back :
-    { ready: "Get ready", move: "Move now", end: "Thank you", hold }[now.phase];
+  const back = say("Take up posture %(number)s again. Next:", { number: cues[held_in].number });
+  const hold = last ? data.still : say("%(still)s. Next:", { still: data.still });
+  by("now").textContent = pausing === "rest" ? say("Rest. Let the arms down") : pausing === "back" ? back :
+    { ready: say("Get ready"), move: say("Move now"), end: say("Thank you"), hold }[now.phase];
   by("calls").replaceChildren(...asked.map(words));
   by("care").hidden = now.phase !== "ready" && pausing !== "rest";
   by("easier").disabled = !shown.can_half || last || now.phase === "end";
   by("easier").setAttribute("aria-pressed", String(half.has(next)));
   by("skip").disabled = last || now.phase === "end" || !may_skip(next);
-  speak(now.phase === "move" ? "Now." : [by("now").textContent, ...asked].join(" "));
+  speak(now.phase === "move" ? say("Now.") : [by("now").textContent, ...asked].join(" "));
   lines.clear();
   lines.add(outline(PLATE, 0xb0b6bb), ...shown.feet.map((points) => outline(points, 0x222222)));
 }
@@ -232,9 +238,11 @@ by("speak").closest("label").hidden = !voices;
 voices?.getVoices(); // asked early: a browser fills its list later
 function speak(text) {
   if (!voices || !by("speak").checked || !playing) return;
-  const voice = voices.getVoices().find((one) => one.localService && one.lang.startsWith("en"));
-  if (!voice) return void (by("said").textContent = "This browser has no English voice of its own: nothing is spoken.");
-  const said = new SpeechSynthesisUtterance(text.replaceAll("°", " degrees"));
+  const tongue = document.documentElement.lang.slice(0, 2);
+  const voice = voices.getVoices().find((one) => one.localService && one.lang.startsWith(tongue));
+  if (!voice) return void (by("said").textContent =
+    say("This browser has no voice of its own for this language: nothing is spoken."));
+  const said = new SpeechSynthesisUtterance(text.replaceAll("°", " " + say("degrees")));
   said.voice = voice;
   voices.cancel();
   voices.speak(said);
@@ -303,7 +311,7 @@ function arrive(now) { // in another part of the dance: look first at what comes
 }
 function run(on) {
   playing = on;
-  by("play").textContent = on ? "Pause" : second > -LEAD && second < data.duration_s ? "Go on" : "Start";
+  by("play").textContent = on ? say("Pause") : second > -LEAD && second < data.duration_s ? say("Go on") : say("Start");
   if (!on) return show();
   if (second >= data.duration_s) restart();
   if (pausing === "rest") [pausing, wait] = ["back", LEAD];
@@ -377,8 +385,8 @@ by("film").onclick = async () => {
     } catch (error) {
       stream = null;
       by("said").textContent = error.name === "NotAllowedError"
-        ? "The camera was not allowed; the dance works without it."
-        : "There is no camera to be used (" + error.name + "); the dance works without it.";
+        ? say("The camera was not allowed; the dance works without it.")
+        : say("There is no camera to be used (%(why)s); the dance works without it.", { why: error.name });
     }
   }
   by("camera").hidden = by("align").hidden = !stream;

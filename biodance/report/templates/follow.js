@@ -15,18 +15,18 @@ function begin() {
   try {
     worker = new Worker(URL.createObjectURL(new Blob([page("pose-program")], { type: "text/javascript" })));
   } catch (error) {
-    return report("This browser cannot follow you (" + error.name + "); the dance works without it.");
+    return report(say("This browser cannot follow you (%(why)s); the dance works without it.", { why: error.name }));
   }
-  worker.onerror = () => report("Following failed in this browser; the dance works without it.");
+  worker.onerror = () => report(say("Following failed in this browser; the dance works without it."));
   worker.onmessage = ({ data: told }) => {
     busy = false;
-    if (told.error) return report("Following failed in this browser (" + told.error + "); the dance works without it.");
+    if (told.error) return report(say("Following failed in this browser (%(why)s); the dance works without it.", { why: told.error }));
     document.body.dataset.follow = "ready";
     if (told.points) told.tag.second ? count(told) : take(told);
     look();
   };
   busy = true;
-  report("Getting ready to follow you.");
+  report(say("Getting ready to follow you."));
   const [wasm, weights] = ["pose-kernels", "pose-weights"].map(page);
   worker.postMessage({ wasm, weights, topology: new TextDecoder().decode(page("pose-model")) }, [wasm, weights]);
 }
@@ -76,12 +76,12 @@ function count(told) { // is there somebody else where the person is not?
 function unseen(points) { // why nobody can be followed now; "" when somebody can
   const sees = (...names) => names.filter((name) => points[NAMED.find(([one]) => one === name)[1]].sure > SURE).length;
   const all = NAMED.filter(([name]) => sees(name)).length;
-  if (all < 5) return "I see nobody. Step into the picture.";
-  if (others > 1) return "I see two people. Only one may be in the picture.";
-  if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return "I do not see your head and shoulders.";
+  if (all < 5) return say("I see nobody. Step into the picture.");
+  if (others > 1) return say("I see two people. Only one may be in the picture.");
+  if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return say("I do not see your head and shoulders.");
   const legs = sees("left ankle", "right ankle", "left knee", "right knee");
-  if (legs < 3) return "I do not see your legs and feet. Step back.";
-  return all < 9 ? "I see only a part of you. Step back, into the light." : "";
+  if (legs < 3) return say("I do not see your legs and feet. Step back.");
+  return all < 9 ? say("I see only a part of you. Step back, into the light.") : "";
 }
 function take(told) {
   const points = found(told), why = unseen(points), { width, height, at: when } = told.tag;
@@ -174,21 +174,22 @@ function grade(phase) { // after a hold: what the move that led to it and the po
   const number = cues[phase.posture].number;
   const short = shortest(phase.posture);
   by("grade").textContent = parts.some(Boolean)
-    ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.${short}`
-    : `Posture ${number}: I did not see it.`;
+    ? say("Posture %(number)s told of what it can:", { number }) + ` ${grades[phase.posture]} %.${short}`
+    : say("Posture %(number)s: I did not see it.", { number });
   draw_known();
   if (!paused && known.every((value, s) => value >= ENOUGH * goal[s])) finish();
 }
 function shortest(k) { // what stayed farthest behind, by more than the camera errs
   const is = reach(k), want = asked_bends[k];
   const [name] = is ? Object.keys(is).sort((a, b) => want[b] - is[b] - want[a] + is[a]) : [];
-  return name && want[name] - is[name] > 15 ? ` Seen: ${name} ${is[name]}° of ${Math.round(want[name])}°.` : "";
+  return name && want[name] - is[name] > 15
+    ? " " + say("Seen: %(what)s %(is)s° of %(want)s°.", { what: say(name), is: is[name], want: Math.round(want[name]) }) : "";
 }
 function draw_known() {
   goal ??= shares(follow.phases.map(intended).reduce(sum));
   const percent = known.map((value, s) => Math.min(100, Math.round((100 * value) / goal[s])));
   by("parts").replaceChildren(...percent.map((value, s) => {
-    const item = words(`${follow.segments[s]}: ${value} %`);
+    const item = words(`${say(follow.segments[s])}: ${value} %`);
     item.style.setProperty("--share", value + "%");
     return item;
   }));
@@ -198,7 +199,7 @@ function draw_known() {
 function finish() {
   paused = true;
   run(false);
-  by("now").textContent = "Enough is known. Thank you";
+  by("now").textContent = say("Enough is known. Thank you");
   by("ask").textContent = "";
   document.body.dataset.enough = second.toFixed(2);
 }
@@ -208,7 +209,8 @@ function missing() { // at the end: the posture that adds most to what was dance
   const gain = (p) => shares(follow.phases.filter((one) => one.posture === p).map(intended).reduce(sum, H))[least];
   const best = [...graded].map((p) => [gain(p), p]).sort((a, b) => b[0] - a[0])[0];
   if (!best) return "";
-  return `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.`;
+  return say("Least is known of this part: %(part)s. Dance posture %(number)s once more.",
+    { part: say(follow.segments[least]), number: cues[best[1]].number });
 }
 
 // ---- how far the joints go, in degrees, by the points of the body ----
@@ -249,12 +251,12 @@ function correct(when, plan, one) {
   let worst = 0.1, said = ""; // m
   want.forEach((x, k) => WAYS.forEach(([axis, more, less]) => {
     const off = x[axis] - is[k][axis], weight = follow.points[k].asks;
-    if (weight * Math.abs(off) > worst) [worst, said] = [weight * Math.abs(off), `${follow.points[k].name} ${off > 0
-      ? more : less}`];
+    if (weight * Math.abs(off) > worst) [worst, said] = [weight * Math.abs(off),
+      say("%(part)s %(way)s", { part: say(follow.points[k].name), way: say(off > 0 ? more : less) })];
   }));
   asked_times = said === asked_for ? asked_times + 1 : 0;
   asked_for = said;
-  const text = said ? said[0].toUpperCase() + said.slice(1) + "." : "Good.";
+  const text = said ? said[0].toUpperCase() + said.slice(1) + "." : say("Good.");
   if (asked_times >= 1) by("ask").replaceChildren(...words(text).childNodes);
 }
 

@@ -48,8 +48,8 @@ by("earlier").onchange = async () => {
       wrong.push(file.name);
     }
   }
-  by("unread").textContent = wrong.length ? `No log of a dance: ${wrong.join(", ")}. Take files that this page saved.`
-    : "";
+  by("unread").textContent = wrong.length
+    ? say("No log of a dance: %(files)s. Take files that this page saved.", { files: wrong.join(", ") }) : "";
   compare();
 };
 function most(log, name) { // the farthest that a joint went in a visit, degrees
@@ -60,13 +60,14 @@ function compare() {
   const logs = [...earlier, ...(begun ? [visit()] : [])].sort((a, b) => (a.begun < b.begun ? -1 : 1));
   const names = [...new Set(logs.flatMap((log) => log.postures.flatMap((one) => Object.keys(one.reached_deg ?? {}))))];
   const danced = (log) => log.postures.filter((one) => one.times > 0);
-  const rows = [["dance", (log) => log.dance], ["postures", (log) => `${danced(log).length} of ${log.postures.length}`],
-    ["easier", (log) => danced(log).filter((one) => one.easier).length],
-    ["held still, s", (log) => danced(log).reduce((sum, one) => sum + one.held_s, 0).toFixed(0)],
-    ...names.map((name) => [name, (log) => most(log, name)])];
+  const rows = [[say("dance"), (log) => log.dance],
+    [say("postures"), (log) => say("%(number)s of %(count)s", { number: danced(log).length, count: log.postures.length })],
+    [say("easier"), (log) => danced(log).filter((one) => one.easier).length],
+    [say("held still, s"), (log) => danced(log).reduce((sum, one) => sum + one.held_s, 0).toFixed(0)],
+    ...names.map((name) => [say(name), (log) => most(log, name)])];
   const cell = (kind, text) => Object.assign(document.createElement(kind), { textContent: text });
   const row = (cells) => { const made = document.createElement("tr"); made.append(...cells); return made; };
-  const heads = [cell("th", "visit"), ...logs.map((log) => cell("th", log.begun.slice(0, 10)))];
+  const heads = [cell("th", say("visit")), ...logs.map((log) => cell("th", log.begun.slice(0, 10)))];
   by("progress").replaceChildren(row(heads), ...rows.map(([name, value]) => row([cell("th", name),
     ...logs.map((log) => cell("td", value(log)))])));
   by("progress").hidden = !logs.length;

@@ -23,7 +23,7 @@ from biodance.virtual_lab.movement.performance import MARGIN, Performance, motio
 from biodance.virtual_lab.movement.posing import WIDTH, Curves, Z, septic, take_stance, turn_about, without_jumps
 from biodance.virtual_lab.movement.protocol import GAITS, STAND, Gait, TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
+from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, stream
 
 G = float(np.linalg.norm(GRAVITY))
 HEEL, TOE = -0.27, 0.73

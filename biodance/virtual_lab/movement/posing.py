@@ -16,7 +16,7 @@ from biodance.motion.ik.legs import LEG, Leg, soft_limit
 from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.tolerances import LabTolerances, smooth_noise
+from biodance.virtual_lab.person.skeleton import LabTolerances, smooth_noise
 
 _ENDS = np.cumsum([0, *map(len, FIELDS.values())]).tolist()
 COLUMNS = {name: slice(*pair) for name, pair in zip(FIELDS, pairwise(_ENDS), strict=True)}

@@ -1,5 +1,5 @@
 """A virtual person: the true body, its masses drawn around a population mean (``anthropometry/virtual/people.toml``),
-its habits and the loads it carries.
+its habits, the loads it carries, and a prosthesis in place of a part of a limb.
 """
 
 from collections.abc import Mapping
@@ -14,15 +14,17 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, freeze
 from biodance.virtual_lab.person.skeleton import (
     ARM_AND_LEG,
+    REALISTIC,
     TRUE_SEGMENTS,
+    LabTolerances,
     Proportions,
     build_joints,
     draw_proportions,
     glue_markers,
     on_side,
+    stream,
     virtual_people,
 )
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
 _POPULATION = 0.08
 """Relative standard deviation of what the people of one place have in common beside the tables' midpoint: as published
@@ -143,7 +145,7 @@ class Habits:
 @dataclass(frozen=True, eq=False)
 class Person:
     """A subject whose truth is known: ``body`` of 16 segments with its true SIP WITHOUT ``loads``, markers as glued in
-    the present session.
+    the present session, in a posture with the joints ``bent`` by so many rad beside upright standing.
     """
 
     subject: Subject
@@ -152,6 +154,7 @@ class Person:
     body: Body
     habits: Habits
     loads: tuple[AddedLoad, ...] = ()
+    bent: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def loaded_body(self) -> Body:
@@ -276,3 +279,49 @@ def _habits(size: Proportions, seed: int) -> Habits:
     stance = 0.115 * size["stature"] * (1 + 0.08 * rng.normal())
     right, left = np.radians(7.0 + 2.5 * rng.normal(size=2))
     return Habits(angles, float(stance), (float(right), float(left)))
+
+
+_REPLACED = {"shank": ("shank", "foot"), "foot": ("foot",), "forearm": ("forearm", "hand")}
+"""What a prosthesis replaces, by its first true segment."""
+_STUMP = 0.85
+"""Share of its length to which the matter of the first segment is squeezed towards the joint: a stump in a socket above
+a tube."""
+
+
+def with_prostheses(person: Person, lighter: Mapping[str, float]) -> Person:
+    """Return the person with prostheses, each so many kg ``lighter`` than the limb from its first segment on.
+
+    Raises
+    ------
+    UnknownName
+        No prosthesis begins there.
+    BiodanceError
+        The limb does not weigh as much.
+    """
+    sip = person.body.sip
+    for segment, less in lighter.items():
+        sip = _fit_prosthesis(sip, segment, less)
+    return replace(person, body=replace(person.body, sip=sip))
+
+
+def _fit_prosthesis(sip: Sip, segment: str, less: float) -> Sip:
+    """Return the true parameters of somebody whose limb from ``segment`` on (a shank, foot or forearm) is a prosthesis
+    that is ``less`` kg lighter than the limb was; on the scale the person weighs what was declared, so that all other
+    segments weigh more.
+    """
+    side, _, first = segment.removesuffix("_hand").partition("_")
+    if first not in _REPLACED or side not in ("right", "left"):
+        legal = tuple(f"{side}_{one}" for side in ("right", "left") for one in _REPLACED)
+        raise UnknownName.of("segment that a prosthesis begins with", segment, legal)
+    limb = [TRUE_SEGMENTS.index(f"{side}_{part}") for part in _REPLACED[first]]
+    bodies, mass = [of_parameters(phi) for phi in sip.phi.reshape(-1, 10)], float(sip.mass[limb].sum())
+    if not 0 < less < mass:
+        raise BiodanceError(
+            f"{segment}: the limb weighs {mass:.2f} kg; it can be 0 to {mass:.2f} kg lighter, not {less}."
+        )
+    squeezed = np.diag([1.0, _STUMP, 1.0, 1.0])
+    bodies[limb[0]] = squeezed @ bodies[limb[0]] @ squeezed
+    total = float(sip.mass.sum())
+    scale = [1 - less / mass if k in limb else 1 + less / (total - mass) for k in range(len(bodies))]
+    phi = np.concatenate([parameters_of_inertia(times * J) for times, J in zip(scale, bodies, strict=True)])
+    return Sip(sip.segments, phi, sip.covariance)

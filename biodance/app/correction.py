@@ -1,0 +1,141 @@
+"""Findings that session.toml can correct: what would be written, and what it changes, in a process of its own:
+``python -m biodance.app.correction SESSION FINDINGS`` prints it as JSON. Nothing of the session is touched.
+"""
+
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from biodance.app.edits import KeyChange, changed_text
+from biodance.app.residuals import residual_rows
+from biodance.effects import SessionEntry
+from biodance.effects.labels_swapped import exchanges
+from biodance.errors import BiodanceError
+from biodance.lab.session.entries import plate_channels
+from biodance.lab.session.file import FILES, read_session_file
+from biodance.lab.session.read import read_session
+from biodance.library import parse_json
+from biodance.pipeline.judged_trials import recorded_of
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+from biodance.records import Trial
+from biodance.report.tables.schema import plain_values
+
+_Finding = Mapping[str, Any]
+
+
+def proposed_correction(folder: Path, findings: Sequence[_Finding]) -> dict[str, Any]:
+    """Return the ``changes`` of session.toml that take ``findings`` off, as the last run told them, and what they
+    change: ``residuals`` as `residual_rows`.
+
+    Raises
+    ------
+    BiodanceError
+        session.toml cannot correct one of them, or it is not found any more.
+    """
+    before = examine(read_session(folder))
+    changes = [change for one in findings for change in CORRECTIONS[SessionEntry(one["session_entry"])](before, one)]
+    joined = _together(changes)
+    with _as_changed(folder, joined) as other:
+        after = examine(read_session(other))
+    return {"changes": joined, "residuals": residual_rows(before, after)}
+
+
+def _together(changes: Sequence[KeyChange]) -> list[KeyChange]:
+    """Return changes of which each key has one: exchanges of the same recording in one list."""
+    found: dict[tuple[str, ...], Any] = {}
+    for keys, value in changes:
+        known = found.get(tuple(keys))
+        found[tuple(keys)] = [*known, *(one for one in value if one not in known)] if known else value
+    return [(list(keys), value) for keys, value in found.items()]
+
+
+def _exchanged_labels(result: SessionResult, finding: _Finding) -> Iterator[KeyChange]:
+    """Yield the exchange of two labels in every recording, or part of one, in which they carry each other's names."""
+    pair, count, said = tuple(finding["target"].split("/")), 0, read_session_file(result.session.folder)
+    recorded = recorded_of(result)
+    for trial in result.session.trials:
+        spans = recorded.once(exchanges).get(trial.name, {}).get(pair, ())
+        if not spans or trial.markers is None:
+            continue
+        count += 1
+        time, stem = trial.markers.time, trial.source.path.stem
+        earlier = [
+            [one.one, one.other, *((one.start, one.end) if math.isfinite(one.start) else ())]
+            for one in said.parts(stem).exchanges
+        ]
+        ends: list[Sequence[float]] = [
+            () if stop - start == time.size else time[[start, stop - 1]].round(4).tolist() for start, stop in spans
+        ]
+        new = [[*pair, *span] for span in ends]
+        yield ["trials", stem, "exchange"], [*earlier, *new]
+    if not count:
+        raise BiodanceError(f"{' and '.join(pair)} carry each other's names no more. Run the session again.")
+
+
+def _exchanged_plates(result: SessionResult, finding: _Finding) -> Iterator[KeyChange]:
+    """Yield the channels of two plates, each under the name of the other."""
+    names = finding["target"].split("/")
+    if finding["trials"]:
+        raise BiodanceError(
+            f"{' and '.join(names)}: session.toml describes plates for all recordings alike, and they are exchanged in "
+            f"{', '.join(finding['trials'])} alone. Accept the correction: it writes copies."
+        )
+    of = next((trial for trial in result.session.trials if set(names) <= {one.name for one in trial.plates}), None)
+    if of is None:
+        raise BiodanceError(f"{' and '.join(names)}: no recording has both plates now. Run the session again.")
+    for name, other in zip(names, reversed(names), strict=True):
+        yield ["plates", name, "channels"], _channels(of, other)
+
+
+def _channels(trial: Trial, name: str) -> list[str | int]:
+    plate = next(one for one in trial.plates if one.name == name)
+    labels, _ = plate_channels(plate, trial)
+    if not labels:
+        raise BiodanceError(f"{name}: its channels have no names. Accept the correction: it writes copies.")
+    return list(labels)
+
+
+def _weighed_mass(result: SessionResult, finding: _Finding) -> Iterator[KeyChange]:
+    """Yield the mass as the plates have it, without devices."""
+    error = finding["parameters"]["error"]["value"]
+    person = result.session.subject
+    yield ["subject", "mass_kg"], round(person.mass - sum(person.devices.values()) + error, 1)
+
+
+CORRECTIONS: Mapping[SessionEntry, Callable[[SessionResult, _Finding], Iterator[KeyChange]]] = {
+    SessionEntry.EXCHANGE: _exchanged_labels,
+    SessionEntry.CHANNELS: _exchanged_plates,
+    SessionEntry.MASS: _weighed_mass,
+}
+"""What of session.toml takes a finding off -> the changes of it."""
+
+
+@contextmanager
+def _as_changed(folder: Path, changes: Sequence[KeyChange]) -> Iterator[Path]:
+    """Yield a folder with links to all that a session holds and session.toml changed; it is gone afterwards."""
+    folder, own = folder.resolve(), "session.toml"
+    with tempfile.TemporaryDirectory(prefix="biodance-") as place:
+        other = Path(place) / folder.name
+        other.mkdir()
+        links = [(one, other) for one in folder.iterdir() if one.name != own]
+        links += [(folder.parent / name, Path(place)) for name in FILES if (folder.parent / name).is_file()]
+        for one, where in links:
+            (where / one.name).symlink_to(one)
+        text = (folder / own).read_text(encoding="utf-8-sig") if (folder / own).is_file() else ""
+        (other / own).write_text(changed_text(text, changes), encoding="utf-8")
+        yield other
+
+
+if __name__ == "__main__":
+    try:
+        told = proposed_correction(Path(sys.argv[1]), parse_json(sys.argv[2]))
+    except BiodanceError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(2)
+    sys.stdout.write(json.dumps(plain_values(told)))

@@ -1,1 +1,0 @@
-"""What is hidden in a recording, made without the formulas that find it."""

@@ -1,1 +1,0 @@
-"""What the instruments of the virtual laboratory record of it."""
