@@ -1,10 +1,10 @@
 """Faults written into copies of real walking sessions at the level of bytes, and what is named.
 
-    BIODANCE_DATA=folder python -m benchmarks walks [--whole] [--only SESSION ...]
+    BIODANCE_DATA=folder python -m benchmarks walks [--whole] [--without-static] [--only SESSION ...]
 
 The folder holds the public sessions named below: C3D files, and TRC with OpenSim's force files. One fault at a time is
 in every file of a copy, as in a laboratory. What witnesses name needs no inverse kinematics: a session takes two
-seconds; ``--whole`` runs the whole diagnosis.
+seconds; ``--whole`` runs the whole diagnosis, ``--without-static`` with static trials taken away.
 """
 
 import argparse
@@ -209,10 +209,14 @@ def files_of(data: Path, name: str) -> list[Path]:
     return [path for path in files if not path.name.startswith(NOT_WALKED)]
 
 
-def scored(data: Path, name: str, place: Path, *, whole: bool) -> Iterator[Score]:
-    """Return the scores of one session, clean first, then each fault."""
+def scored(data: Path, name: str, place: Path, *, whole: bool, static: bool = True) -> Iterator[Score]:
+    """Return the scores of one session, clean first, then each fault; with its ``static`` trials or without."""
     files = files_of(data, name)
     clean = read_session(copied(files, place / name / "clean", ""))
+    if not static:
+        still = {trial.source.path.name for trial in clean.trials if trial.role == "static"}
+        files = [one for one in files if one.name not in still]
+        clean = read_session(copied(files, place / name / "moving", ""))
     for number, fault in enumerate([Fault("nothing", "", ()), *faults_for(clean)]):
         try:
             session = read_session(copied(files, place / name / str(number), fault.text)) if fault.text else clean
@@ -250,12 +254,14 @@ def main() -> None:
     """Print what was named in each session, and the counts."""
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--whole", action="store_true")
+    ask.add_argument("--without-static", action="store_true")
     ask.add_argument("--only", nargs="*", default=SESSIONS)
     asked = ask.parse_args()
     scores = []
     with tempfile.TemporaryDirectory() as place:
         for name in asked.only:
-            for one in scored(Path(os.environ["BIODANCE_DATA"]), name, Path(place), whole=asked.whole):
+            data, static = Path(os.environ["BIODANCE_DATA"]), not asked.without_static
+            for one in scored(data, name, Path(place), whole=asked.whole, static=static):
                 scores.append(one)
                 mark = f"{_mark(one)} | {one.covered} | {one.verdict}{one.told}"
                 print(f"{name} | {one.fault.kind} | {mark}", flush=True)

@@ -21,7 +21,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Source, Subject, Trial
-from biodance.records.attention import NOT_USED
+from biodance.records.attention import NotUsed
 from biodance.spatial import elementary_rotation
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
@@ -227,7 +227,7 @@ def test_a_typed_leg_that_the_markers_contradict_is_refused_aloud_and_does_not_m
     legs = measure_static(SUBJECT, trial).sizes.leg_length
     typed = {"LLegLength": legs["left"] - 0.1, "RLegLength": legs["right"] - 0.01}
     wrong = scaled(SUBJECT, replace(trial, measurements=typed))[0]
-    (said,) = (note for note in wrong.notes if note.startswith(NOT_USED))
+    (said,) = (note for note in wrong.notes if isinstance(note, NotUsed))
     assert "LLegLength was typed as" in said
     hip = wrong.joint_index("left_hip_flexion")
     assert np.linalg.norm(wrong.joints[hip].translation - shown.joints[hip].translation) < 0.002

@@ -31,12 +31,11 @@ def test_calls_are_said_in_the_order_of_the_language() -> None:
     assert dance_instructions(small_dance())[1] == ("lift the left arm sideways by about 60°",)
 
 
-@pytest.mark.parametrize("phrase", posture_phrases())
-def test_every_word_of_a_posture_is_found_in_its_name(phrase: str) -> None:
-    mine = {text: f"<{text}>" for text in (*posture_phrases(), IN_PART)}
-    name = f"bow from the hips, back straight, {phrase}, {IN_PART}, both arms back"
+def test_every_part_of_the_name_of_a_posture_is_said() -> None:
+    mine = {text: f"<{text}>" for text in posture_phrases()}
+    name = f"bow from the hips, back straight, {IN_PART}, both arms back"
     assert posture_said(name, mine.__getitem__) == (
-        f"<bow from the hips, back straight>, <{phrase}>, <{IN_PART}>, <both arms back>"
+        f"<bow from the hips>, <back straight>, <{IN_PART}>, <both arms back>"
     )
 
 

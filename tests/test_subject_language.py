@@ -18,7 +18,7 @@ from made_cycles import walked_knees
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
 from biodance.dance.problem.plan import read_plan
-from biodance.dance.search.known_postures import IN_PART, posture_phrases
+from biodance.dance.search.known_postures import posture_phrases
 from biodance.errors import FileRefused, UnknownName
 from biodance.lab.session.file import VisitEntry
 from biodance.library import folder, names
@@ -51,7 +51,7 @@ def sentences() -> set[str]:
     cues = tomllib.loads((folder("protocols") / "vocabulary" / "cues.toml").read_text(encoding="utf-8"))
     words = {one for group in cues.values() for _, *texts in group.values() for one in texts}
     care = {one for name in names("protocols/dances") for one in read_plan(name).care}
-    return code | words | care | {*posture_phrases(), IN_PART}
+    return code | words | care | set(posture_phrases())
 
 
 def catalogue(language: str) -> Catalog:

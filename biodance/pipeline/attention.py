@@ -39,7 +39,7 @@ _MEND = "Mend what stands below, and run this again."
 _WHY: dict[Reason, tuple[str, str]] = {
     Reason.PERSON_UNKNOWN: ("the person's mass or stature is not known", "Give them in session.toml."),
     Reason.MOVEMENT_NOT_JUDGED: ("none of the movement could be judged", _SQUATS),
-    Reason.BODY_NOT_SCALED: ("no static trial scales the body", "Record a static trial."),
+    Reason.BODY_NOT_SCALED: ("the body comes from stature alone", "Record a static trial."),
     Reason.BODY_DOUBTFUL: ("what is known of the body contradicts itself", _MEND),
     Reason.NOT_COMPARED: ("no movement could be compared with a body", _MEND),
     Reason.ONLY_STANDING: ("standing still tells little", _SQUATS),

@@ -25,7 +25,7 @@ from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing
 from biodance.records import Mask, Session, Sip, Subject, by_name
-from biodance.records.attention import NOT_USED, WARNING
+from biodance.records.attention import WARNING, NotUsed
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -133,12 +133,8 @@ class SessionResult:
 
     @property
     def scaled(self) -> bool:
-        """Whether the person's own markers scaled the body: on a static trial, or on a frame of a moving one if they
-        show every joint (what an unseen arm does, and where a moving body stands, is too much to guess together).
-        """
-        done = {step.name for step in self.steps if step.status == "done"}
-        shown = self.body is not None and bool(self.body.free.all())
-        return "scale" in done or (ON_A_FRAME in done and shown)
+        """Whether the person's own markers scaled the body: on a static trial, or on a frame of a moving one."""
+        return any(step.name in ("scale", ON_A_FRAME) and step.status == "done" for step in self.steps)
 
     def __getitem__(self, name: str) -> TrialResult:
         """Return what was found in the trial of that name; UnknownName lists all names."""
@@ -201,7 +197,7 @@ class SessionResult:
     @property
     def unused(self) -> tuple[str, ...]:
         """What was typed of the subject and contradicted by the markers, so that theirs was taken."""
-        return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith(NOT_USED))
+        return tuple(note for note in (self.body.notes if self.body else ()) if isinstance(note, NotUsed))
 
     @property
     def slips(self) -> tuple[str, ...]:

@@ -188,7 +188,7 @@ _SENTENCES = {
     Reason.NOT_COMPARED: "No movement could be compared with a body.",
     Reason.MOVEMENT_NOT_JUDGED: "None of the movement could be judged, and standing still tells little.",
     Reason.PERSON_UNKNOWN: "Mass or stature is not known, so there is no body.",
-    Reason.BODY_NOT_SCALED: "No static trial, and joints that no marker shows: forces of such a body name no cause.",
+    Reason.BODY_NOT_SCALED: "The body comes from stature alone, so its forces are too unsure to name a cause.",
     Reason.BODY_DOUBTFUL: "The forces fit this body, but {about}.",
     Reason.LIMIT_BROKEN: "No cause was found for what is outside its limit: {about}.",
     Reason.UNDESCRIBED_JOINTS: "The body moves at joints ({about}) for which nobody has learned yet what is usual.",

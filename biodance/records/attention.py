@@ -58,12 +58,14 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
-NOT_USED = "Not used: "
-"""Beginning of a note on what was typed and the recordings contradict."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")  # What may differ between two sentences of one wording
 _FEW = 4  # Trials of one check that are told one by one
 LIMIT_TOLD = ", should be "
 """Between the value of a check and its limit, in a sentence about it."""
+
+
+class NotUsed(str):
+    """A note on what was typed and the recordings contradict, so that it was not used."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import LANDMARKS, MarkerSet, canonical, landmark, read_marker_set
 from biodance.lab.markers.upright import WINDOW, posture_frames
 from biodance.records import SIDES, Array, Markers, Subject, Trial
-from biodance.records.attention import NOT_USED, WARNING
+from biodance.records.attention import WARNING, NotUsed
 
 _NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
@@ -285,12 +285,14 @@ def _bent(place: Mapping[str, Array], side: str) -> bool:
     return bool(np.hypot(*(knee - asis)[:2]) > asis[2] - knee[2])
 
 
-def _contradicted(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> tuple[dict[str, str], str]:
+def _contradicted(
+    given: Mapping[str, float], width: float, place: Mapping[str, Array]
+) -> tuple[dict[str, NotUsed], str]:
     """Return the typed lengths of legs that the markers contradict, by their name in ``given``, and what to do; and a
     warning where they contradict the typed width of the pelvis, of which the markers' is used anyway ("" if not).
     """
     legs = {
-        name.lower(): f"{NOT_USED}{said}"
+        name.lower(): NotUsed(f"Not used: {said}")
         for side, name in ((side, f"{letter}LegLength") for side, letter in _LETTER.items())
         if not _bent(place, side)
         and (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))

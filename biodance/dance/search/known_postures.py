@@ -120,15 +120,15 @@ def read_vocabulary() -> Vocabulary:
 
 
 def posture_phrases() -> tuple[str, ...]:
-    """Return all words of limbs of which names of postures are made, those of paired limbs of both and of each; what a
-    limb does of which nothing is asked is not named.
+    """Return all parts of which names of postures are made, a comma and a space between them: words of limbs, those of
+    paired limbs of both and of each, and `IN_PART`; what a limb does of which nothing is asked is not named.
     """
     texts = [word.text for group in read_vocabulary().values() for word in group if not word.rest]
     sides = ("both", *(f"the {side}" for side in SIDES))
     out = ["stand", "sit"]
     for text in (*texts, _FREE_ARM):
         out += [singular(text.format(side)) if side != "both" else text.format(side) for side in sides]
-    return tuple(dict.fromkeys(out))
+    return tuple(dict.fromkeys(part for one in (*out, IN_PART) for part in one.split(", ")))
 
 
 def _word(where: str, key: str, raw: dict[str, Any]) -> Word:

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterable
 
 from biodance.dance.cues import Say
-from biodance.dance.search.known_postures import IN_PART, posture_phrases
 from biodance.report.pages.language import N_
 
 COMPOSED = (
@@ -46,18 +45,8 @@ _SAID = re.compile(r'\bsay\(\s*"((?:[^"\\]|\\.)*)"')
 
 
 def posture_said(name: str, say: Say) -> str:
-    """Return the ``name`` of a posture, which is words of limbs behind each other."""
-    known = sorted(posture_phrases(), key=len, reverse=True)
-    said, rest = list[str](), name
-    while rest:
-        first = next((one for one in known if rest == one or rest.startswith(f"{one}, ")), rest)
-        rest = rest[len(first) :].removeprefix(", ")
-        if rest == IN_PART or rest.startswith(f"{IN_PART}, "):
-            rest = rest.removeprefix(IN_PART).removeprefix(", ")
-            said.append(f"{say(first)}, {say(IN_PART)}")
-        else:
-            said.append(say(first))
-    return ", ".join(said)
+    """Return the ``name`` of a posture, its parts (`posture_phrases`) said one by one."""
+    return ", ".join(say(part) for part in name.split(", "))
 
 
 def script_words(scripts: Iterable[str], translated: Callable[[str], str]) -> dict[str, str]:

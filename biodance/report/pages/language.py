@@ -54,6 +54,10 @@ class Language:
             round(float(value), digits), format=f"#,##0.{digits * '0'}".strip("."), locale=self.locale
         )
 
+    def short(self, value: float, digits: int = 1) -> str:
+        """Return a number with at most so many ``digits`` after the decimal sign, without zeros at its end."""
+        return format_decimal(round(float(value), digits), format=f"#,##0.{digits * '#'}", locale=self.locale)
+
     def date(self, day: date | str | None) -> str:
         """Return a day (a date, or as ISO 8601) in words; any other text as it is, "" for none."""
         try:
