@@ -52,10 +52,10 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
-    from biodance.pipeline.laboratory import judge_plates as judge_plates
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.movement import SessionMovement as SessionMovement
     from biodance.pipeline.movement import describe_movement as describe_movement
+    from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
@@ -93,7 +93,7 @@ HOMES = {
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
     "pipeline.movement": ("SessionMovement", "describe_movement"),
-    "pipeline.laboratory": ("judge_plates",),
+    "pipeline.plates": ("judge_plates",),
     "pipeline.stream": ("stream_recording",),
     "pipeline.results": ("SessionResult",),
     "pipeline.robot": ("identify_robot",),

@@ -27,7 +27,7 @@ from biodance.lab.readers.trc import read_trc, write_trc
 from biodance.lab.robot import read_encoders
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.results_folder import check_results, write_manifest
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.records import Trial
 from biodance.report.laboratory import to_toml
 from biodance.uncertainty.tolerances import shipped

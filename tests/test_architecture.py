@@ -19,7 +19,6 @@ COMPLEXITY = 20  # the end of radon's grade C
 ONE_ALGORITHM = {
     "lab/program_tables.py": "tables of OpenSim and BIDS, and what their tools want beside them",
     "pipeline/session.py": "a session through all its stages, each of which may fail alone",
-    "pipeline/laboratory.py": "what a laboratory says of itself, and what its sessions say of its plates",
     "pipeline/front.py": "what is asked of a visit: register, identify, diagnose, compare",
     "batch/run.py": "an archive: what is to do, by whom, and what is done",
     "batch/work.py": "one session in its own process, and its outcome",
@@ -28,7 +27,6 @@ ONE_ALGORITHM = {
     "body/human/human.py": "the human Body and the prior of its masses",
     "body/human/skeleton.py": "the joint tree of a person, with the joints that only some sessions show",
     "body/parts.py": "what a Body is made of, and lumps of mass as ten parameters about a joint",
-    "lab/corrections.py": "every fault of a plate, made and undone, and lab.toml's list of them",
     "lab/readers/table.py": "a table's cells, units and columns to markers",
     "lab/session/entries.py": "the small tables of session.toml, checked, and what they do to trials",
     "lab/session/recordings.py": "which files of a folder are trials, and what lies beside them",
@@ -44,7 +42,6 @@ ONE_ALGORITHM = {
     "pipeline/results.py": "the records of one examined session",
     "pipeline/robot.py": "a robot from recording to masses, with what is said of it",
     "pipeline/saved_results.py": "what a results folder keeps, and from what it was made",
-    "pipeline/scenes.py": "what is drawn: instants, postures, trials as moving pictures",
     "pipeline/visits.py": "visits beside each other: their quantities, and what changed",
     "records/session.py": "who came, and what was recorded of him, checked at birth",
     "records/wrench.py": "what was measured: where it came from, markers, plates, the wrench of all of them",

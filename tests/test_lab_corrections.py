@@ -21,7 +21,7 @@ from biodance.lab.corrections import (
 from biodance.lab.readers import read_trial
 from biodance.lab.session.file import read_session_file
 from biodance.pipeline.accepted import write_corrected
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.records import FootEvent, LeftOutSpan, Plate, Session, Subject, Trial, Wrench
 
 

@@ -11,7 +11,7 @@ from biodance.diagnosis.archive.norms import SeenValue, norms, usual_noise
 from biodance.diagnosis.learning import Null, learn_tolerances, shown_by
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.learn import (
     LearnedLaboratory,
     LearnedSession,

@@ -9,7 +9,7 @@ from made_cycles import curve, cycle, level_gait, trial
 
 from biodance.cycles.curves import CycleCurve, group_curves
 from biodance.cycles.scores import SCORE_ANGLES
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.learn import MeasuredWalk, healthy_reference, learn_laboratory
 from biodance.pipeline.movement import SessionMovement
 from biodance.report.pages.movement import movement_section

@@ -25,7 +25,7 @@ from biodance.diagnosis.archive.judge import judge_archive
 from biodance.lab.session.read import read_session
 from biodance.pipeline.dance import DanceResult
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.laboratory import PlatesJudged
+from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.session import examine
 from biodance.report.dance import cards_page
 from biodance.report.pages.feedback import write_feedback

@@ -7,7 +7,7 @@ from biodance.dance.expectation import Expectation
 from biodance.dance.problem.stance import stance
 from biodance.dance.verify import ZmpPath
 from biodance.motion.kinematics import poses
-from biodance.pipeline.scenes import bone_lines
+from biodance.pipeline.still import bone_lines
 from biodance.records import Subject
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 

@@ -23,7 +23,7 @@ from biodance.lab.plain_text import for_spreadsheet
 from biodance.lab.robot import read_encoders
 from biodance.lab.session.results_folder import read_manifest
 from biodance.library import read_toml
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.report.files import write_tables
 from biodance.report.live import LivePage
 from biodance.report.pages.template import script_json

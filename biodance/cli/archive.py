@@ -81,7 +81,7 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     """
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.laboratory import judge_plates
+    from biodance.pipeline.plates import judge_plates
     from biodance.report.plates import print_plates, write_plates
 
     with progress() as tell:

@@ -94,7 +94,7 @@ def diagnose_command(
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
         return diagnose_robot(session, results, robot, for_people)
     from biodance.pipeline import front
-    from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.report.terminal import print_diagnosis
@@ -184,7 +184,7 @@ def identify_command(
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.front_dance import performance_of
     from biodance.pipeline.judged_trials import failed_checks
-    from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import by_paper, identification_of
     from biodance.report.write import write_identification

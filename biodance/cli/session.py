@@ -46,7 +46,7 @@ def report_session(
     person who was measured in that language; return the result and the content of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
-    from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
@@ -119,7 +119,7 @@ def examine_with_reference(
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.dance import plates_too_small
     from biodance.pipeline.front import identify
-    from biodance.pipeline.laboratory import read_lab
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.saved_results import known_body
     from biodance.pipeline.session import examine
 

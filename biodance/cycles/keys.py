@@ -9,7 +9,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride
-from biodance.lab.corrections import GAIN
+from biodance.lab.plates.faults import GAIN
 from biodance.records import SIDES, Array
 
 ANGLE_PANELS = (

@@ -32,7 +32,7 @@ from biodance.identification.robot import (
     slow_wrench,
 )
 from biodance.identification.statistics import Statistics, empty, layout_for, standing_point
-from biodance.lab.corrections import DELAY, OFFSET
+from biodance.lab.plates.faults import DELAY, OFFSET
 from biodance.motion.dynamics import regressor
 from biodance.motion.grounded import ground_again
 from biodance.records import Array, Wrench

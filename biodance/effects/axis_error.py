@@ -9,7 +9,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
 from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
-from biodance.lab.corrections import CROSSTALK, GAIN
+from biodance.lab.plates.faults import CROSSTALK, GAIN
 from biodance.records import CHANNELS, Array, Plate, Trial
 from biodance.spatial import wrench_about_point
 

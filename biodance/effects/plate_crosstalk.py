@@ -3,7 +3,7 @@
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.words import CALIBRATE, About, CauseWords, CheckKind
-from biodance.lab.corrections import CROSSTALK
+from biodance.lab.plates.faults import CROSSTALK
 
 _LEAST = {"1": 0.002, "m": 0.001, "1/m": 0.01}
 """1, m, 1/m that matter: makers' accuracy, 0.05 to 0.2 % of full scale."""

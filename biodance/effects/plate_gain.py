@@ -12,7 +12,7 @@ from biodance.effects._base.quality_check import QualityCheck, Recorded
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import CALIBRATE, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.effects.body_mass import BodyMass
-from biodance.lab.corrections import GAIN
+from biodance.lab.plates.faults import GAIN
 from biodance.records import Trial, Wrench
 
 _LARGE, _DEAD = 0.1, -0.9

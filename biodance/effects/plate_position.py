@@ -4,7 +4,7 @@ from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
-from biodance.lab.corrections import POSITION
+from biodance.lab.plates.faults import POSITION
 
 _LEAST = 0.003
 """m that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,

@@ -6,7 +6,7 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
-from biodance.lab.corrections import ROTATION
+from biodance.lab.plates.faults import ROTATION
 from biodance.records import Array
 
 _LEAST = 0.005

@@ -15,7 +15,7 @@ from biodance.effects.added_mass import AddedMass
 from biodance.effects.axis_error import AxisError
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.toe_landmark import ToeLandmark
-from biodance.lab.corrections import CROSSTALK, DELAY, GAIN, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
+from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
 from biodance.observations._recording import SeenTrial
 from biodance.observations._sensitivity import Sensitivity
 from biodance.records import CHANNELS, SIDES, Array, Plate, Wrench

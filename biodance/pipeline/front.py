@@ -26,7 +26,7 @@ from biodance.pipeline.body import body_of, refuse_another_reference
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
 from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.session import by_paper, examine, identification_of

@@ -31,8 +31,8 @@ from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_in
 from biodance.pipeline.judged_trials import cases_of, chosen_windows
-from biodance.pipeline.laboratory import told_failure
 from biodance.pipeline.movement import session_movement
+from biodance.pipeline.plates import told_failure
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import now
 from biodance.pipeline.session import examine

@@ -33,7 +33,7 @@ from biodance.motion.dynamics import regressor
 from biodance.motion.ik.inverse_kinematics import Follower
 from biodance.motion.soles import soles_from_body
 from biodance.motion.track import smooth, upright_trunk
-from biodance.pipeline.scenes import asked_words
+from biodance.pipeline.asked import asked_words
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.caution import widened_prior

@@ -14,7 +14,7 @@ from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
-from biodance.pipeline.laboratory import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import movement_of

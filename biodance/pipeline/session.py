@@ -30,7 +30,7 @@ from biodance.pipeline.identification import (
     with_weighed_mass,
 )
 from biodance.pipeline.results import Placed, SessionResult
-from biodance.pipeline.scenes import load_still, still_of, worst_still
+from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
 from biodance.records import Mask, Motion, Session

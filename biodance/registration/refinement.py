@@ -16,8 +16,8 @@ from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.effects import Case
 from biodance.errors import TrialRefused
-from biodance.lab.corrections import DELAY, POSITION, ROTATION
 from biodance.lab.markers.sets import landmark, read_marker_set
+from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
 from biodance.motion.contact import Contact, dilate, ground_contact, speeds
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.soles import Soles, inside, soles_from_body

@@ -18,14 +18,8 @@ from biodance.display import spaced
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.plain_text import for_spreadsheet
 from biodance.pipeline.dance import DanceResult, not_safe
-from biodance.pipeline.scenes import (
-    held_postures,
-    posture_still,
-    preview_markers,
-    preview_parameters,
-    setpoints,
-    silhouettes,
-)
+from biodance.pipeline.preview import held_postures, preview_markers, preview_parameters, setpoints
+from biodance.pipeline.still import posture_still, silhouettes
 from biodance.records import Array
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png

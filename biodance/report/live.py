@@ -20,8 +20,8 @@ from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.display import cause_in_words, spaced
 from biodance.errors import BiodanceError
+from biodance.pipeline.asked import asked_posture
 from biodance.pipeline.live import LiveResult, LiveState
-from biodance.pipeline.scenes import asked_posture
 from biodance.report.dance import mannequin_svg
 from biodance.report.tables.identification import ASKED
 from biodance.report.tables.schema import Row, Schema

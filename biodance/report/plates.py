@@ -15,7 +15,7 @@ from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.judge import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED, spaced
-from biodance.pipeline.laboratory import PlatesJudged
+from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.saved_results import now
 from biodance.report.figures.style import figure, look, svg_address
 from biodance.report.files import for_spreadsheets, write_files

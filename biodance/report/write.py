@@ -16,11 +16,11 @@ from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
-from biodance.pipeline.laboratory import LAB, lab_text
+from biodance.pipeline.lab_file import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
-from biodance.pipeline.scenes import frames_of
+from biodance.pipeline.session_frames import frames_of
 from biodance.records.attention import Attention
 from biodance.report.files import write_files
 from biodance.report.methods import METHODS, methods_text

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.corrections import CROSSTALK, DELAY, GAIN, OFFSET, POSITION, ROTATION, PlateFault
+from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, POSITION, ROTATION, PlateFault
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import shipped

@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
-from biodance.lab.corrections import PlateFault
+from biodance.lab.plates.faults import PlateFault
 from biodance.records import Array
 from biodance.spatial import wrench_about_origin
 

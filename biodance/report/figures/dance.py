@@ -9,7 +9,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, spaced
 from biodance.motion.kinematics import poses
-from biodance.pipeline.scenes import bone_lines, silhouettes
+from biodance.pipeline.still import bone_lines, silhouettes
 from biodance.records import Array, side_in_name
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
 

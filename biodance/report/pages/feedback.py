@@ -20,7 +20,7 @@ from biodance.display import spaced
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import not_safe
-from biodance.pipeline.scenes import parent_segments
+from biodance.pipeline.still import parent_segments
 from biodance.records import SIDES, Array, side_in_name
 from biodance.report.files import refuse_page, write_files
 from biodance.report.pages.dance_words import script_words

@@ -17,7 +17,7 @@ from biodance.identification.validation import TrialValidation
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import Provenance
-from biodance.pipeline.scenes import SessionReplay, TrialReplay
+from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS, AngleState
 from biodance.records.attention import Attention

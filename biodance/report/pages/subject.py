@@ -13,7 +13,7 @@ from biodance.display import BLACK, BLUE, GREY, spaced
 from biodance.lab.session.file import VisitEntry
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
-from biodance.pipeline.scenes import silhouettes
+from biodance.pipeline.still import silhouettes
 from biodance.records import Array
 from biodance.report.pages.language import ENGLISH, N_, Language, read_language
 from biodance.report.pages.subject_movement import plain_movement
