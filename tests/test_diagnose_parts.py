@@ -217,10 +217,3 @@ def test_plates_and_sides_share_their_tolerances() -> None:
     assert key_of("marker_misplaced", "LASI") == "marker_misplaced ASI"
     assert key_of("marker_misplaced", "C7") == "marker_misplaced C7"
     assert key_of("time_delay", "") == "time_delay"
-
-
-def test_a_cause_never_measured_is_as_sure_as_the_others() -> None:
-    back = read_tolerances(to_toml(replace(known(), accuracy={"plate_gain": 0.04, "other": 0.1})))
-    assert back.model_error("plate_gain") == 0.04
-    assert back.model_error("tram_shaking") == 0.1
-    assert known().model_error("plate_gain") == 0.0

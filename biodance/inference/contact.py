@@ -13,7 +13,6 @@ from scipy.linalg import solve
 
 from biodance.diagnosis.candidates import local_basis
 from biodance.effects import NamedCause, Transient
-from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
 from biodance.inference.scales import fit, posterior, prior_sd, products
@@ -163,7 +162,7 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     prior = effect.prior / kinds / len(SIZES)
     before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
     value = found.log_evidence + touched.log_sure - base.log_sure + before + float(np.log(prior / (1 - prior)))
-    causes = (*(c for c in base.causes if cause_key(c) != cause_key(touch)), touch)
+    causes = (*(c for c in base.causes if c.names != touch.names), touch)
     return replace(touched, causes=causes, log_posterior=value)
 
 

@@ -19,12 +19,11 @@ from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
-from biodance.effects import ChannelEffect, InstalledPlate, NamedCause, unit_at
+from biodance.effects import UNLIKE, ChannelEffect, InstalledPlate, NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
 from biodance.effects.toe_landmark import ToeLandmark
-from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Key, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, SOFT, Rows
@@ -69,12 +68,12 @@ class Place:
         """The cause, then all that the data cannot tell from it (`TOGETHER`), and what else it takes to hold `IN_SET`
         of the posterior.
         """
-        kept, sum_, own = [], 0.0, next(b for name, _, b in self.shares if name == cause_key(self.cause))
+        kept, sum_, own = [], 0.0, next(b for name, _, b in self.shares if name == self.cause.names)
         for name, share, bayes in self.shares:
             if sum_ < IN_SET or bayes >= own - TOGETHER:
                 kept.append(Alias(*name, bayes))
             sum_ += share
-        return tuple(sorted(kept, key=lambda alias: (alias.effect, alias.target) != cause_key(self.cause)))
+        return tuple(sorted(kept, key=lambda alias: (alias.effect, alias.target) != self.cause.names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,7 @@ class Inferred:
         posterior mean lies two standard deviations from none; surer than careful laboratories are alike, and than
         faults are like their models, is none.
         """
-        best, known, out = self.best, self.search.rows.tolerances, []
+        best, out = self.best, []
         named = {(one.effect, one.target) for one in self.diagnosis.findings}
         for one in self.search.causes:
             where, unit = best.rows.tolerated.get(one.names, (slice(0), np.zeros((1, 0))))
@@ -122,9 +121,7 @@ class Inferred:
             (parameter,), value = one.effect.parameters, float(unit[0] @ best.coefficients[where])
             turn, own = best.columns.turn[where], np.zeros(best.fit.u.size)
             own[: turn.shape[1]] = unit[0] @ turn * best.fit.size[: turn.shape[1]]
-            sd = np.hypot(
-                max(best.fit.variance(own) ** 0.5, parameter.alike), known.model_error(one.effect.name) * value
-            )
+            sd = np.hypot(max(best.fit.variance(own) ** 0.5, parameter.alike), UNLIKE * value)
             size = Estimate(parameter.name, value, float(sd), unit_at(parameter.unit, one.effect.target))
             if size.known and matters(one.effect, np.array([value])):
                 out.append(Finding(*one.names, (size,), (), 1.0, kind=one.effect))
@@ -148,7 +145,7 @@ def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...
         best = max(fewer, key=lambda one: np.logaddexp(one.log_posterior, one.log_unknown))
     sure, rest = (every[-1] if best.causes else ()), list(every[0] if every else ())
     for one in sure:
-        rest.remove(max(rest, key=partial(_share_in, cause_key(one.cause))))
+        rest.remove(max(rest, key=partial(_share_in, one.cause.names)))
     held = [one.names for one in sure]
     return (
         *(replace(one, probability=min(one.probability, posterior.share(one.names))) for one in sure),
@@ -164,7 +161,7 @@ def _share_in(name: Key, place: Place) -> float:
 def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Mapping[Key, float]) -> Place:
     """Return one cause of a set, with what may stand in its place beside the others."""
     total = {one.names: float(np.logaddexp(one.log_posterior, one.log_unknown)) for one in posterior.hypotheses}
-    rest, wide = best.names - {cause_key(cause)}, len(best.names)
+    rest, wide = best.names - {cause.names}, len(best.names)
     here = {next(iter(names - rest)): v for names, v in total.items() if len(names) == wide and rest < names}
     none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
     shares = [(name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()]
@@ -183,7 +180,7 @@ def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> Named
         (weight, one.whole(own), one.whole_covariance(own))
         for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
         for own in one.causes
-        if cause_key(own) == cause_key(cause) and weight > 0 and alike.isdisjoint(one.names)
+        if own.names == cause.names and weight > 0 and alike.isdisjoint(one.names)
     ]
     weight = np.array([one[0] for one in found])
     weight /= weight.sum()
@@ -285,7 +282,7 @@ def _is_of_one_step(rows: Rows, one: NamedCause) -> bool:
     steps = [o for o in rows.evidence.observations if o.plate and o.contact[1]]
     plate = one.effect.target.partition(":")[0]
     own = {o.contact for o in steps if o.plate == plate or plate not in {p.plate for p in steps}}
-    exact = rows.evidence.contacts(cause_key(one)) if cause_key(one) in rows.evidence.causes else 0
+    exact = rows.evidence.contacts(one.names) if one.names in rows.evidence.causes else 0
     return len(own) == 1 and exact < CONTACTS
 
 
@@ -298,7 +295,7 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
-    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), known.model_error(one.effect.name) * length)
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), UNLIKE * length)
     if rows.problem is None:
         reported = tuple(
             (p.name, float(t), float(s), p.unit) for p, t, s in zip(one.effect.parameters, theta, sd, strict=True)

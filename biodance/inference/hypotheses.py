@@ -10,7 +10,6 @@ from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import SCALE
 from biodance.effects import Effect, NamedCause
-from biodance.inference.causes import cause_key
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, Rows
 from biodance.inference.scales import ScaledFit
@@ -57,7 +56,7 @@ class Hypothesis:
     @property
     def names(self) -> frozenset[Key]:
         """Effect and target of its causes."""
-        return frozenset(cause_key(one) for one in self.causes)
+        return frozenset(one.names for one in self.causes)
 
     @property
     def left(self) -> Array:
@@ -84,7 +83,7 @@ class Hypothesis:
         """Return the size (p,) of a cause with what its own tolerance, or the body, has taken of it: both look alike,
         and the sum is what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
         """
-        where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
+        where, unit = self.rows.tolerated.get(one.names, (slice(0), np.zeros((one.theta.size, 0))))
         size = np.asarray(one.theta + unit @ self.coefficients[where])
         if (share := self._in_body(one)) is not None:
             size[0] += share @ self.phi
@@ -103,7 +102,7 @@ class Hypothesis:
         row = np.append(seen, np.zeros(self.Z.shape[1])) * self.fit.size
         at = self.columns.X.shape[1]
         for other in self.causes:
-            row[at] = SCALE * one.effect.typical[0] * (cause_key(other) == cause_key(one))
+            row[at] = SCALE * one.effect.typical[0] * (other.names == one.names)
             at += other.theta.size
         unseen = float(own @ own - seen @ seen) * float(np.exp(2 * self.fit.scales.groups[body]))
         covariance = np.array(one.covariance)

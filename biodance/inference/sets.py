@@ -17,7 +17,6 @@ from scipy.linalg import solve_triangular
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect, NamedCause
-from biodance.inference.causes import cause_key, unlike
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
@@ -172,7 +171,7 @@ def _without_each(search: Search, known: dict[frozenset[tuple[str, str]], Hypoth
         best = max(known.values(), key=lambda one: one.log_posterior)
         for gone in best.causes if len(best.causes) > 1 else ():
             rest = tuple(one for one in best.causes if one is not gone)
-            names = frozenset(map(cause_key, rest))
+            names = frozenset(one.names for one in rest)
             if names not in known:
                 known[names] = hypothesis(search, rest, best.fit.scales)
         if max(known.values(), key=lambda one: one.log_posterior) is best:
@@ -209,7 +208,7 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
         sure, at = unlike_models(one, effects, taken), nearer(found, prior_sd(rows), search.least)
         if max(moved, at.far(found.scales), float(np.abs(sure - one.sure).max())) < CONVERGED:
             break
-    value = found.log_evidence + one.log_sure + sum(search.prior[cause_key(c)] for c in causes)
+    value = found.log_evidence + one.log_sure + sum(search.prior[c.names] for c in causes)
     possible = all(rows.possible(c.effect, c.theta) for c in causes)
     return replace(one, log_posterior=value) if possible else one
 
@@ -233,7 +232,7 @@ def unlike_models(one: Hypothesis, effects: Sequence[Effect], taken: Sequence[Ar
     loud = np.exp(-2 * one.fit.scales.noise)
     most = np.zeros(rows.noises + 1)
     for effect, added in zip(effects, taken, strict=True):
-        most += unlike(effect) ** 2 * loud * rows.mean_square(added)
+        most += effect.unlike**2 * loud * rows.mean_square(added)
     most[: len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
     left = loud * rows.mean_square(one.left / one.surety)
     return np.asarray(1 / np.sqrt(1 + np.clip(left - 1.0, 0.0, most)))

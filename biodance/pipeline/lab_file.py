@@ -111,7 +111,7 @@ class _Tolerances(_Table):
     noise: list[Annotated[list[_Row], Field(min_length=6, max_length=6)]] = Field(max_length=100)
     sizes: dict[str, Annotated[float, Field(ge=0, le=1e6)]] = {}
     means: dict[str, Finite] = {}
-    accuracy: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
+    accuracy: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}  # written until 2026-11-29, of no use since
     instruments: _Instruments = _Instruments()
 
 

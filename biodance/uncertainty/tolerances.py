@@ -76,11 +76,10 @@ class Tolerances:
     covariance of one coefficient at `REFERENCE_PERSON`; ``movement`` (B, 6) mean square of a coefficient of the wrench
     that the null sessions' movement needs, at `REFERENCE_PERSON`; ``threshold`` of the evidence (natural logarithm)
     that no more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a
-    nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by
-    effect: share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite
-    like its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
-    beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
-    the plates' zero, an error like the other sizes: it hides causes, and no noise does.
+    nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``norms`` by kind
+    of observation (`Observation.kind`): what a laboratory's own sessions share beyond what is expected everywhere, and
+    its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is the plates' zero, an error like the other
+    sizes: it hides causes, and no noise does.
     """
 
     sizes: Mapping[str, float]
@@ -89,14 +88,13 @@ class Tolerances:
     threshold: float
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
-    accuracy: Mapping[str, float] = field(default_factory=dict)
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
     norms: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     zeros: Array = field(default_factory=lambda: np.zeros(()))
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
-        tables = ("sizes", "means", "accuracy", "norms")
+        tables = ("sizes", "means", "norms")
         assign(self, **{name: MappingProxyType(dict(getattr(self, name))) for name in tables})
         assign(self, zeros=np.broadcast_to(self.zeros, self.noise.shape))
         freeze(self, "Tolerances", noise=(bands, 6, 6), zeros=(bands, 6, 6), movement=(bands, 6))
@@ -112,12 +110,6 @@ class Tolerances:
     def mean(self, key: str) -> float:
         """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
         return self.means.get(key, 0.0)
-
-    def model_error(self, effect: str) -> float:
-        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
-        ones.
-        """
-        return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
 
     def knows(self, effect: str) -> bool:
         """Return whether any size of ``effect`` was learned."""
@@ -198,7 +190,6 @@ def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
         raw["threshold"],
         raw["origin"],
         raw.get("means", {}),
-        raw.get("accuracy", {}),
         _instruments(raw.get("instruments", {})),
     )
 
@@ -229,7 +220,6 @@ def to_toml(found: Tolerances, *, under: str = "") -> str:
     lines += ["]", "", *_instruments_text(found.instruments, prefix), "", f"[{prefix}sizes]"]
     lines += [f'"{key}" = {value:.9g}' for key, value in sorted(found.sizes.items())]
     lines += ["", f"[{prefix}means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
-    lines += ["", f"[{prefix}accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
     return "\n".join(lines) + "\n"
 
 

@@ -25,6 +25,11 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_origin
 
+UNLIKE = 0.07
+"""Share of its size by which every cause is unlike its model: derivatives at the samples that are looked at are no
+better at the upper edge of the bands. No size that is told is surer than that.
+"""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -114,8 +119,8 @@ class Effect(Checked):
 
     @property
     def unlike(self) -> float:
-        """Share of its size by which its wrench may be unlike its model, where that is more than for every cause."""
-        return 0.0
+        """Share of its size by which its wrench may be unlike its model, `UNLIKE` or more."""
+        return UNLIKE
 
     def columns(self, case: Case) -> Array:
         """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one,

@@ -17,3 +17,8 @@ class NamedCause:
     theta: Array
     covariance: Array
     course: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target
