@@ -288,14 +288,15 @@ def _is_of_one_step(rows: Rows, one: NamedCause) -> bool:
 
 def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     """Return a cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like
-    their models.
+    their models where it comes from these.
     """
     one, known = place.cause, rows.tolerances
     theta, covariance = _told_size(rows, one), one.covariance
+    share = one.effect.unlike if theta is one.theta else UNLIKE
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
-    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), UNLIKE * length)
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), share * length)
     if rows.problem is None:
         reported = tuple(
             (p.name, float(t), float(s), p.unit) for p, t, s in zip(one.effect.parameters, theta, sd, strict=True)
