@@ -64,8 +64,6 @@ STRANGE = frozenset((Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES))
 """Reasons that alone speak of nothing wrong: how unlike the table people are, and how large what is small everywhere,
 was learned from few laboratories, and clean sessions of others are beyond it.
 """
-OF_RESIDUAL = frozenset((*STRANGE, Reason.FORCES_LEFT))
-"""Reasons that come of what is left beside the causes named."""
 
 
 def status_of(reasons: Collection[Reason], *, named: bool, clean: bool) -> DiagnosisStatus:

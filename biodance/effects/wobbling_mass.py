@@ -56,7 +56,7 @@ class WobblingMass(Effect):
 
     @property
     def unlike(self) -> float:
-        """What swings slowly shows its mass over the square of its resonance: 4 to 6 Hz, not 5, are 40 % of the mass."""
+        """Slow movement shows the mass over the square of its resonance: 4 to 6 Hz, not 5, are 40 % of it."""
         return 0.4
 
     def columns(self, case: Case) -> Array:

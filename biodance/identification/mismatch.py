@@ -195,16 +195,3 @@ def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
     triangle[: len(rows)] = rows
     triangle[-1, -1] = np.hypot(triangle[-1, -1], data.R[-1, -1])
     return Information(triangle, data.frames)
-
-
-def evidence_of_scale(data: Information, prior: Sip, scales: Array) -> Array:
-    """Return the log evidence (n,) of whitened ``data`` when the prior's standard deviations are multiplied by each
-    of ``scales`` (n,).
-
-    The rule that chooses the prior's weight is maximum a posteriori: scale 1. This curve shows whether the data agree.
-    """
-    A = data.triangle @ prior.covariance @ data.triangle.T
-    value, vector = np.linalg.eigh(0.5 * (A + A.T))
-    turned = (vector.T @ (data.target - data.triangle @ prior.phi)) ** 2
-    spread = 1.0 + np.outer(np.asarray(scales) ** 2, np.maximum(value, 0.0))
-    return np.asarray(-0.5 * (np.log(spread) + turned / spread).sum(axis=1))
