@@ -11,8 +11,8 @@ from walking import MASS, Wrong, session, standing, walk
 
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import NamedCause
-from biodance.inference.decision import IN_SET, NAMED, places
+from biodance.effects import NamedCause, Parameter
+from biodance.inference.decision import IN_SET, NAMED, places, well
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.sets import hypothesis
 from biodance.observations import Observation
@@ -136,6 +136,31 @@ def test_a_cause_is_as_probable_as_with_and_without_an_unknown_one(bare: Hypothe
     assert every.probabilities() == {("drawn", "a"): pytest.approx((1 - unknown) * 0.9 + unknown * 0.3)}
     for place in places(every, {}):
         assert place.probability <= (1 - unknown) * 0.9 + unknown * 0.3 + 1e-9
+
+
+class Least(Drawn):
+    """A force that matters from 2 N on."""
+
+    parameters = (Parameter("size", "N", 1.0, "a draw", least=2.0),)
+
+
+@pytest.mark.parametrize(("matters", "probability"), [(True, 0.63), (False, 0.63 + 0.1 * 0.8)])
+def test_nothing_is_wrong_where_nothing_that_matters_is_there(
+    bare: Hypothesis, matters: bool, probability: float
+) -> None:
+    """0.4 for none, 0.3 for a force too small to matter, 0.3 for one that is not; an unknown in one session of ten,
+    beside which the large one is there in one of five.
+    """
+
+    def of_size(share: float, newton: float) -> Hypothesis:
+        cause = NamedCause(Least("a"), np.array([newton]), np.array([[0.01]]))
+        return replace(holding(bare, np.log(share)), causes=(cause,))
+
+    sets = [holding(bare, np.log(0.4)), of_size(0.3, 1.0), of_size(0.3, -5.0)]
+    beside = [replace(one, log_unknown=one.log_posterior - np.log(9)) for one in sets]
+    loud = posterior(holding(bare, np.log(0.8)), of_size(0.2, 5.0))
+    every = replace(posterior(*beside), louder=loud)
+    assert well(bare.rows, every, unknown_matters=matters) == pytest.approx(probability)
 
 
 @pytest.mark.parametrize(

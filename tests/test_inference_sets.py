@@ -5,13 +5,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from biodance.inference.causes import UNLIKE
 from inferred_rows import Drawn, covariance, log_prior, rows, search, with_target
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal, norm
 
 from biodance.diagnosis.candidates import SCALE
-from biodance.effects import NamedCause
+from biodance.effects import UNLIKE, NamedCause
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior
 from biodance.inference.scales import FLOOR, Scales, bare, nominal, posterior, prior_sd
 from biodance.inference.scales import LOUD as LOUDNESS

@@ -167,7 +167,7 @@ class Diagnosis:
     witnesses : ObservedEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
     p_clean, p_unknown : float
-        Probability of no cause at all, and of one that nobody described; NaN where nothing could be judged.
+        Probability of nothing that matters, and of a cause that nobody described; NaN where nothing could be judged.
 
     Examples
     --------

@@ -36,6 +36,8 @@ class Reason(StrEnum):
     """The markers move more on the body than where tolerances were learned."""
     CONTRADICTED = "contradicted"
     """What the simulation would name is contradicted by Newton, or rests on a single step."""
+    NOT_SURE = "not sure"
+    """That something matters is more probable than not, and no cause is probable enough to be named."""
     UNUSUAL_BODY = "unusual body"
     """The forces fit only a body that is more unlike the table than people are."""
     OUTSIDE_TOLERANCES = "outside tolerances"
@@ -57,6 +59,7 @@ DOUBTS = frozenset(
         Reason.UNDESCRIBED_JOINTS,
         Reason.TOLERANCES_DO_NOT_HOLD,
         Reason.CONTRADICTED,
+        Reason.NOT_SURE,
     )
 )
 """Reasons for which no cause can be told, whatever is left."""

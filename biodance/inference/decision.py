@@ -1,10 +1,11 @@
 """What a session ends with: the posterior and what matters, decided once.
 
 A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
-does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place, and whatever the data
-cannot tell from it, however rare it is. Its size is averaged over all sets of causes that hold it without a look-alike.
-No delay is named that Newton contradicts, and no fault of a plate from one step on it: nobody can then tell what is
-wrong.
+does matters to a laboratory (`consequence`). Nothing is wrong where it is more probable than not that nothing is there
+that matters (`well`); between the two nobody can tell. The set of a cause holds 95 % of the posterior of its place, and
+whatever the data cannot tell from it, however rare it is. Its size is averaged over all sets of causes that hold it
+without a look-alike. No delay is named that Newton contradicts, and no fault of a plate from one step on it: nobody can
+then tell what is wrong.
 """
 
 from collections.abc import Mapping, Set
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import TOGETHER, changes
@@ -36,6 +38,8 @@ from biodance.uncertainty.tolerances import key_of
 
 NAMED, SUGGESTED = 0.85, 0.5
 """Probability from which a cause is named, and from which it is told as only resembled."""
+_COUNTED = 1e-4
+"""Probability below which it is not asked whether the causes of a set are large."""
 IN_SET = 0.95
 """Share of the posterior of its place that the set of a cause holds."""
 _FAR = 3.0
@@ -203,18 +207,25 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     named = [one for one in sure if not _is_forbidden(rows, one[0].cause)]
     resembled = [one for one in large if one not in named]
     left = adequacy(posterior.unexplained, rows)
-    unknown, open_ = posterior.unknown >= UNKNOWN and any(row.matters for row in left), len(named) < len(sure)
+    matters_left = any(row.matters for row in left)
+    unknown, open_ = posterior.unknown >= UNKNOWN and matters_left, len(named) < len(sure)
+    p_clean = well(rows, posterior, unknown_matters=matters_left)
+    reasons = {
+        Reason.FORCES_LEFT: unknown,
+        Reason.CONTRADICTED: open_,
+        Reason.NOT_SURE: not (named or unknown or open_) and p_clean < SUGGESTED,
+    }
     findings = _with_look_alikes(named, best, rows)
     told = replace(
         bare,
-        explained=not any((unknown, open_, named and resembled)),
-        why={**bare.why, **_why(posterior, rows, named=bool(named), unknown=unknown, open_=open_)},
+        explained=not any((*reasons.values(), named and resembled)),
+        why={**bare.why, **_why(posterior, rows, reasons, named=bool(named))},
         findings=(*findings, *_habit(best, rows, findings)),
         resembles=tuple(finding for _, finding in resembled),
         tolerated=tuple(one[1] for one in likely if one not in large),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
-        p_clean=posterior.clean,
+        p_clean=p_clean,
         p_unknown=posterior.unknown,
     )
     return Inferred(told, search, posterior, tuple(place.cause for place, _ in named))
@@ -228,13 +239,37 @@ def _with_look_alikes(named: list[_Told], best: Hypothesis, rows: Rows) -> tuple
     )
 
 
-def _why(posterior: Posterior, rows: Rows, *, named: bool, unknown: bool, open_: bool) -> dict[Reason, tuple[str, ...]]:
-    """Return why no more is said: what is strange where anything is ``named`` or left, forces that an ``unknown`` cause
-    leaves, and causes that are sure and may not be named (``open_``).
+def _why(
+    posterior: Posterior, rows: Rows, reasons: Mapping[Reason, bool], *, named: bool
+) -> dict[Reason, tuple[str, ...]]:
+    """Return why no more is said: what is strange where anything is ``named`` or left, and those of ``reasons`` that
+    hold.
     """
-    found = dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
-    further = {Reason.FORCES_LEFT: unknown, Reason.CONTRADICTED: open_}
-    return {**found, **{reason: () for reason, holds in further.items() if holds}}
+    found = dict.fromkeys(_strange(posterior.unexplained, rows) if reasons[Reason.FORCES_LEFT] or named else (), ())
+    return {**found, **{reason: () for reason, holds in reasons.items() if holds}}
+
+
+def well(rows: Rows, posterior: Posterior, *, unknown_matters: bool) -> float:
+    """Return the probability that nothing is there that matters: of all sets none of whose causes is large, without an
+    unknown cause, or beside one where what is left is too small to matter.
+    """
+    own = float(posterior.weights[_without_large(rows, posterior), 0].sum())
+    if unknown_matters:
+        return own
+    if posterior.louder is None:
+        return own + float(posterior.weights[_without_large(rows, posterior), 1].sum())
+    loud = posterior.louder
+    return own + posterior.unknown * float(loud.weights[_without_large(rows, loud)].sum())
+
+
+def _without_large(rows: Rows, posterior: Posterior) -> NDArray[np.bool_]:
+    """Return (H,) which sets hold no cause that is large; of those too improbable to count, none."""
+    return np.array(
+        [
+            weight > _COUNTED and not any(_is_large(rows, cause) for cause in one.causes)
+            for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
+        ]
+    )
 
 
 def _is_forbidden(rows: Rows, one: NamedCause) -> bool:

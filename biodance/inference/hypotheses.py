@@ -139,11 +139,6 @@ class Posterior:
         return float(self.weights[:, 1].sum())
 
     @property
-    def clean(self) -> float:
-        """Probability of no cause at all."""
-        return float(self.weights[[not one.causes for one in self.hypotheses], 0].sum())
-
-    @property
     def weights(self) -> Array:
         """(H, 2) probability of every hypothesis, without and with the unknown."""
         both = np.array([[one.log_posterior, one.log_unknown] for one in self.hypotheses])
