@@ -14,7 +14,7 @@ from biodance.diagnosis.consequence import LIMIT, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DOUBTS
 from biodance.discovery import Chosen
-from biodance.effects import UNLIKE, Case, DiscreteEffect, Effect, QualityCheck, effects
+from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, effects
 from biodance.effects.joint_centre import JointCentre
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.effects.marker_misplaced import MarkerMisplaced
@@ -77,7 +77,7 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
     own = replace(effect, target=error.spared)
     shift = own.measured(np.zeros(3), *cases)
     alike = max(known.size(f"shown {own.name}"), known.size(key_of(own.name, error.spared)))
-    sd = np.hypot(alike, UNLIKE * np.linalg.norm(shift))
+    sd = np.hypot(alike, own.size_error * np.linalg.norm(shift))
     if matters(own, shift) and np.linalg.norm(shift) >= max(_EXPLAINS * error.moved, 2 * sd):
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 

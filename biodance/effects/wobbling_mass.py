@@ -46,6 +46,8 @@ class WobblingMass(Effect):
         look_alikes="Another filter on forces than on markers; a delay; an error of that segment's mass.",
         settled_by="Hops and heel drops, which excite more than 5 Hz; below that even ten kilograms hardly show.",
     )
+    size_error = 0.4
+    """Slow movement shows the mass over the square of its resonance: 4 to 6 Hz, not 5, are 40 % of it."""
     words = CauseWords("{size}{between} of soft tissue swing at the {it}", "Accept it.", "soft tissue")
 
     @classmethod
@@ -53,11 +55,6 @@ class WobblingMass(Effect):
         """Return the trunk, thighs and shanks; every segment of a body that has none of these."""
         soft = tuple(name for name in case.body.segments if name.endswith(("trunk_head", "thigh", "shank")))
         return soft or case.body.segments
-
-    @property
-    def unlike(self) -> float:
-        """Slow movement shows the mass over the square of its resonance: 4 to 6 Hz, not 5, are 40 % of it."""
-        return 0.4
 
     def columns(self, case: Case) -> Array:
         """Return the wrench per kilogram of the mass's motion relative to the bone."""

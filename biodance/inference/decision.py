@@ -21,7 +21,7 @@ from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
-from biodance.effects import UNLIKE, ChannelEffect, InstalledPlate, NamedCause, unit_at
+from biodance.effects import ChannelEffect, InstalledPlate, NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
@@ -125,7 +125,7 @@ class Inferred:
             (parameter,), value = one.effect.parameters, float(unit[0] @ best.coefficients[where])
             turn, own = best.columns.turn[where], np.zeros(best.fit.u.size)
             own[: turn.shape[1]] = unit[0] @ turn * best.fit.size[: turn.shape[1]]
-            sd = np.hypot(max(best.fit.variance(own) ** 0.5, parameter.alike), UNLIKE * value)
+            sd = np.hypot(max(best.fit.variance(own) ** 0.5, parameter.alike), one.effect.size_error * value)
             size = Estimate(parameter.name, value, float(sd), unit_at(parameter.unit, one.effect.target))
             if size.known and matters(one.effect, np.array([value])):
                 out.append(Finding(*one.names, (size,), (), 1.0, kind=one.effect))
@@ -323,15 +323,14 @@ def _is_of_one_step(rows: Rows, one: NamedCause) -> bool:
 
 def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     """Return a cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like
-    their models where it comes from these.
+    their models.
     """
     one, known = place.cause, rows.tolerances
     theta, covariance = _told_size(rows, one), one.covariance
-    share = one.effect.unlike if theta is one.theta else UNLIKE
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
-    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), share * length)
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), one.effect.size_error * length)
     if rows.problem is None:
         reported = tuple(
             (p.name, float(t), float(s), p.unit) for p, t, s in zip(one.effect.parameters, theta, sd, strict=True)

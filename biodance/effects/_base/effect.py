@@ -27,7 +27,7 @@ from biodance.spatial import wrench_about_origin
 
 UNLIKE = 0.07
 """Share of its size by which every cause is unlike its model: derivatives at the samples that are looked at are no
-better at the upper edge of the bands. No size that is told is surer than that.
+better at the upper edge of the bands.
 """
 
 
@@ -84,6 +84,8 @@ class Effect(Checked):
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
     """
+    size_error: ClassVar[float] = UNLIKE
+    """Share of itself by which the size that is told errs, beyond what the rows leave open."""
     carries: ClassVar[tuple[str, ...]] = ()
     """Joints of the model that it moves along: where a movement placed them without it, nothing beside them is accused.
     """
