@@ -33,7 +33,7 @@ from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
-from biodance.records import Mask, Motion, Session
+from biodance.records import Mask, Session
 from biodance.threads import one_thread
 
 
@@ -59,17 +59,17 @@ def _examined(
     read: tuple[TrialResult, ...],
     body: Body | None,
     mass: float,
-    followed: tuple[Motion | None, ...],
+    earlier: tuple[TrialResult | None, ...],
     tell: Callable[[str], None],
 ) -> tuple[TrialResult, ...]:
-    """Return the trials tracked, where they are not ``followed`` already, and compared, with their checks; those that
-    Ctrl-C left undone say so.
+    """Return the trials tracked, where the same markers were not followed ``earlier``, and compared, with their checks;
+    those that Ctrl-C left undone say so.
     """
     results: list[TrialResult] = []
     try:
-        for k, (one, motion) in enumerate(zip(read, followed, strict=True), 1):
+        for k, (one, before) in enumerate(zip(read, earlier, strict=True), 1):
             tell(f"tracking {one.trial.name}, {k} of {len(read)}")
-            results.append(examine_trial(one, body, mass=mass, followed=motion))
+            results.append(examine_trial(one, body, mass=mass, before=before))
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
     return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
@@ -194,8 +194,8 @@ def examine(
     body, prior, shown = placed.body, placed.prior, placed.shown
     if body is not None and reference is not None:
         refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
-    followed = (one.motion for one in earlier.trials) if earlier and placed is before else repeat(None, len(read))
-    done = _examined(read, body, session.subject.mass, tuple(followed), tell)
+    followed = earlier.trials if earlier and placed is before else tuple(repeat(None, len(read)))
+    done = _examined(read, body, session.subject.mass, followed, tell)
     if body is not None and placed.plain is not None:
         body, shown = with_forces(shown, placed.plain, body, done)
     steps += placed.steps
