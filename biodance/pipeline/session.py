@@ -262,7 +262,7 @@ def identified(
             identification = attempt(steps, "identify", work)
         except KeyboardInterrupt:
             steps.append(_stop("the segments were identified"))
-    still = attempt(steps, "still", lambda: still_of(body, done)) if body else None
+    still = attempt([], "still", lambda: still_of(body, done)) if body else None
     more = _stills(body, done, identification) if body else ()
     return replace(result, steps=tuple(steps), identification=identification, still=still, more_stills=more)
 
