@@ -11,7 +11,7 @@ from biodance.lab.prepare import LowPass
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.motion.track import own_cutoff, smooth, with_own_cutoff
+from biodance.motion.track import Followed, asked_cutoff, own_cutoff, smooth, with_cutoff
 from biodance.records import Array, Markers, Motion, Source, Subject, Trial
 from biodance.settings import USUAL
 
@@ -72,7 +72,7 @@ def error(truth: Motion, q: Array, cutoff: float) -> float:
 )
 def test_no_usual_cutoff_tells_the_wrench_better(rate, slow, noise, late):
     truth, markers = recorded(rate, slow, noise, late)
-    cutoff, q = own_cutoff(WOMAN, markers, LowPass()), solve_ik(WOMAN, markers).q
+    cutoff, q = own_cutoff(Followed(WOMAN, markers), LowPass()), solve_ik(WOMAN, markers).q
     others = {fixed: error(truth, q, fixed) for fixed in FIXED if fixed < rate / 2}
     assert error(truth, q, cutoff) <= 1.05 * min(others.values())
 
@@ -81,9 +81,9 @@ def test_no_usual_cutoff_tells_the_wrench_better(rate, slow, noise, late):
 def test_a_trial_gets_its_cutoff_and_a_sentence(noise):
     _, markers = recorded(100.0, 1.0, noise, 0.0)
     trial = Trial("squat", "fit", markers, (), Source(Path("squat.c3d"), "", "c3d"))
-    found = with_own_cutoff(trial, WOMAN, markers)
-    cutoff = found.settings.filter.cutoff
-    assert found.settings == USUAL.changed({"filter.cutoff": own_cutoff(WOMAN, markers, LowPass())})
+    cutoff = asked_cutoff(trial, Followed(WOMAN, markers))
+    found = with_cutoff(trial, cutoff)
+    assert found.settings == USUAL.changed({"filter.cutoff": own_cutoff(Followed(WOMAN, markers), LowPass())})
     assert found.history == (
         f"Cut-off of the low-pass: {cutoff:g} Hz, where the filtered markers of this trial lie nearest to the path of "
         "rigid segments.",
@@ -92,7 +92,7 @@ def test_a_trial_gets_its_cutoff_and_a_sentence(noise):
 
 def test_more_noise_lowers_the_cutoff_and_a_faster_movement_raises_it():
     calm, shaken, fast = (
-        own_cutoff(WOMAN, recorded(100.0, *how)[1], LowPass())
+        own_cutoff(Followed(WOMAN, recorded(100.0, *how)[1]), LowPass())
         for how in ((1.0, 0.0005, 0.0), (1.0, 0.004, 0.0), (2.0, 0.0005, 0.0))
     )
     assert shaken < calm < fast
@@ -105,7 +105,7 @@ def test_what_the_markers_cannot_tell_is_left_as_it_is():
     legs = markers.select(("LASI", "RASI", "LKNE"))
     short = Markers(markers.names, markers.time[:20], markers.xyz[:20])
     for one, worn in ((chosen, markers), (replace(trial, role="static"), markers), (trial, legs), (trial, short)):
-        assert with_own_cutoff(one, WOMAN, worn) is one
+        assert asked_cutoff(one, Followed(WOMAN, worn)) is None
 
 
 def test_gaps_of_a_few_markers_change_little():
@@ -113,6 +113,6 @@ def test_gaps_of_a_few_markers_change_little():
     xyz = np.array(markers.xyz)
     xyz[300:420, [3, 8, 20]] = np.nan
     whole, gappy = (
-        own_cutoff(WOMAN, Markers(markers.names, markers.time, one), LowPass()) for one in (markers.xyz, xyz)
+        own_cutoff(Followed(WOMAN, Markers(markers.names, markers.time, one)), LowPass()) for one in (markers.xyz, xyz)
     )
     assert gappy == pytest.approx(whole, abs=0.3)

@@ -117,8 +117,6 @@ def examine_with_reference(
     """
     from biodance.errors import SessionRefused
     from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.dance import plates_too_small
-    from biodance.pipeline.front import identify
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.saved_results import known_body
     from biodance.pipeline.session import examine
@@ -129,9 +127,16 @@ def examine_with_reference(
     earlier = lab.corrected(reading.read(reading.reference, tell)) if reading.reference else None
     recording = lab.corrected(reading.read(session, tell))
     place = results_folder(results.out, session, force=results.force)
-    if dance is not None and (why := plates_too_small(dance, recording)):
-        say(f"look: {why}")
-    before = identify(earlier, tell=tell) if earlier else None
+    before = None
+    if dance is not None:
+        from biodance.pipeline.dance import plates_too_small
+
+        if why := plates_too_small(dance, recording):
+            say(f"look: {why}")
+    if earlier is not None:
+        from biodance.pipeline.front import identify
+
+        before = identify(earlier, tell=tell)
     return examine(recording, reference=before, known=known, tell=tell), before, place
 
 

@@ -264,7 +264,11 @@ def load_curves(
     own = [(k, seen) for k, (joint, _) in enumerate(names) if (seen := _seen_from(cycle, joint)) is not None]
     columns, share = [k for k, _ in own], np.eye(sip.phi.size) if body.sharing is None else body.sharing
     rows, given, mass = rows[:, columns], given[:, columns], float(sip.mass.sum())
-    variance = np.sum((rows @ (share @ sip.covariance @ share.T)) * rows, axis=-1)
+    variance, covariance = np.empty(given.shape), share @ sip.covariance @ share.T
+    for column in range(len(columns)):  # of the links beyond the joint alone: no other parameter moves it
+        beyond = np.flatnonzero(rows[:, column].any(axis=0))
+        needs = rows[:, column, beyond]
+        variance[:, column] = np.sum((needs @ covariance[np.ix_(beyond, beyond)]) * needs, axis=-1)
     value, sd = (rows @ (share @ sip.phi) - given) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
     for column, (k, (side, joint, sign)) in enumerate(own):
         kind = names[k][1]

@@ -120,9 +120,10 @@ def _of_angle(one: CycleCurve, spans: Mapping[_Curve, Mapping[str, float]]) -> I
 def _of_load(one: CycleCurve, angles: Mapping[_Curve, CycleCurve]) -> Iterator[KeyValue]:
     """Yield both extremes with their uncertainty, and how fast the joint turns there if it is a power."""
     joint = one.quantity.partition("_")[0]
-    turn = angles.get((one.cycle, one.side, _TURNS.get(joint, f"{joint}_flexion")))
+    turn = angles.get((one.cycle, one.side, _TURNS.get(joint, f"{joint}_flexion"))) if one.unit == "W/kg" else None
+    turning = None if turn is None else _turning(turn)
     for key, at in (("maximum", int(np.nanargmax(one.value))), ("minimum", int(np.nanargmin(one.value)))):
-        rate = float(_turning(turn)[at]) if turn is not None and one.unit == "W/kg" else 0.0
+        rate = 0.0 if turning is None else float(turning[at])
         sd, rate = np.nan_to_num([one.sd[at], rate]).tolist()
         yield _key(one, key, float(one.value[at]), sd=sd, rate=rate)
 

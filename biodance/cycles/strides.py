@@ -56,10 +56,11 @@ def strides(
     leaving the ground to the other foot's strike, and stiffness (`vertical_stiffness`) are of running.
     """
     heel, mass, found = heel_and_toe(body, soles.outline)[0][..., :2], float(body.sip.mass.sum()), []
+    velocity = np.gradient(centre[:, :2], soles.time, axis=0)
     for one in (one for one in cycles if one.kind == "gait"):
         other_off, other_strike = _other_foot(one, events)
         values = _values(one, other_off, other_strike, heel, soles.time)
-        values |= _margins(one, other_off, other_strike, heel, soles, centre)
+        values |= _margins(one, other_off, other_strike, heel, soles, centre, velocity)
         contact, flight = one.off - one.start, other_strike - one.off
         if flight > 0:
             stiffness = 1e-3 * vertical_stiffness(mass, contact, flight)
@@ -79,14 +80,21 @@ def vertical_stiffness(mass: float, contact: float, flight: float) -> float:
 
 
 def _margins(
-    cycle: Cycle, other_off: float, other_strike: float, heel: Array, soles: Soles, centre: Array
+    cycle: Cycle,
+    other_off: float,
+    other_strike: float,
+    heel: Array,
+    soles: Soles,
+    centre: Array,
+    velocity: Array,
 ) -> dict[str, float]:
     """Return by how much the sole reaches beyond the extrapolated centre of mass, m (Hof et al. 2005,
     doi:10.1016/j.jbiomech.2004.03.025): ``margin_aside`` outwards, the least of single support; ``margin_ahead`` along
     the stride, at the strike.
 
     The extrapolated centre is where centre + velocity / root(g / l) lies over the ground, with l the mean distance of
-    the centre of mass from the heel while the foot stands; velocity is relative to the ground.
+    the centre of mass from the heel while the foot stands; ``velocity`` (T, 2) m/s of the centre is taken relative to
+    the ground.
     """
     foot, time = SIDES.index(cycle.side), soles.time
     ground = _ground(cycle, heel[:, foot], time)
@@ -98,10 +106,11 @@ def _margins(
     outwards = np.array([along[1], -along[0]]) * (1.0 if cycle.side == "right" else -1.0)
     from_heel = centre[stands] - np.column_stack([heel[stands, foot], soles.outline[stands, foot, :, 2].min(axis=1)])
     pendulum = np.sqrt(np.linalg.norm(from_heel, axis=1).mean() / STANDARD_GRAVITY)
-    beyond = centre[:, :2] + pendulum * (np.gradient(centre[:, :2], time, axis=0) - ground)
-    aside, ahead = ((soles.outline[:, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
-    margins = {"margin_ahead": float(np.interp(cycle.start, time, ahead))}
-    single = (time >= other_off) & (time <= other_strike)
+    near = cycle.frames(time)
+    beyond = centre[near, :2] + pendulum * (velocity[near] - ground)
+    aside, ahead = ((soles.outline[near, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
+    margins = {"margin_ahead": float(np.interp(cycle.start, time[near], ahead))}
+    single = (time[near] >= other_off) & (time[near] <= other_strike)
     return margins | ({"margin_aside": float(aside[single].min())} if single.any() else {})
 
 

@@ -17,7 +17,13 @@ from scipy.special import logsumexp
 
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
-from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
+from biodance.identification.load_posterior import (
+    MASSES,
+    LoadPosterior,
+    LoadView,
+    log_mass_prior,
+    log_ratio_if,
+)
 from biodance.identification.loads import unit_load
 from biodance.identification.unloaded_body import (
     UnloadedBody,
@@ -194,10 +200,13 @@ def _suspect(segment: str, i: int, bodies: tuple[_Judged, ...], load: Array, non
 def _smallest(bodies: tuple[_Judged, ...], i: int) -> float:
     """Return the load (kg) on segment ``i`` from which on "no load" is improbable enough; infinite if none is."""
     prior = log_mass_prior(_COARSE) - np.log(len(bodies[0].views))
+    squares = np.array([one.views[i].squares for one in bodies])
+    own, wide = np.swapaxes([one.views[i].at_the_mean(_COARSE) for one in bodies], 0, 1)
+    nothing = np.array([one.log_prior + one.log_det for one in bodies])
 
     def announced(true: float) -> bool:
-        none = np.array([one.log_prior + one.log_det - 0.5 * true**2 * one.views[i].squares for one in bodies])
-        load = np.array([n + one.views[i].log_ratio_if(true, _COARSE) for n, one in zip(none, bodies, strict=True)])
+        none = nothing - 0.5 * true**2 * squares
+        load = none[:, None] + log_ratio_if(true, _COARSE, squares, own, wide)
         left = logsumexp(none)
         return bool(left - np.logaddexp(left, logsumexp(load + prior)) < np.log(_THRESHOLD))
 

@@ -138,13 +138,12 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
 
 
 def undo_dilution(
-    body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, *, open_table: bool
+    body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, room: Sip, *, open_table: bool
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where
     that moves a mass by more than its intervals can bear. ``before`` is the table, whose open questions the data answer
-    if ``open_table``.
+    if ``open_table``; ``room`` the same that may carry a load.
     """
-    room = with_unknown_load(body, before)
     now, known = measured, replace(total).information(measured.noise)
     for _ in range(_ROUNDS):
         table = more_probable_table(now.data, before, body)[0] if open_table else before

@@ -264,7 +264,7 @@ def conclude(
     room = before if machine else with_unknown_load(body, before)
     got = discounted(total, noise or learn_noise(total, room)[0], found, room)
     if found is not None and not machine:
-        got = undo_dilution(body, total, got, found, before, open_table=prior is None)
+        got = undo_dilution(body, total, got, found, before, room, open_table=prior is None)
     data = got.data
     before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
     posterior = find_posterior(data, before)

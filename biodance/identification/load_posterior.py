@@ -14,7 +14,6 @@ the better its first moments are known: `LoadView.log_place_information` gives b
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -100,10 +99,10 @@ class LoadView:
         """
         return np.asarray(0.5 * np.log(1 + masses[:, None] ** 2 * self.strength).sum(axis=1))
 
-    def log_ratio_if(self, true: float, masses: Array) -> Array:
-        """Return the same (n,) if the data showed a load of ``true`` kg at the mean place and nothing else."""
-        own, wide = _at_the_mean(self, masses.tobytes())
-        return (true * masses - 0.5 * masses**2) * self.squares + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide)
+    def at_the_mean(self, masses: Array) -> tuple[Array, Array]:
+        """Return sum u² / (1 + m² D'D) and sum log(1 + m² D'D) (n,) for ``masses`` (n,) kg, see `log_ratio_if`."""
+        wide = 1 + masses[:, None] ** 2 * self.strength
+        return (self.unit**2 / wide).sum(axis=1), np.log(wide).sum(axis=1)
 
     def place(self, weight: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation (3,) m of the load's CoM in the segment's frame, over masses of
@@ -117,13 +116,13 @@ class LoadView:
         return mean, np.sqrt(share @ (narrow @ (self.ways[1:4] ** 2).T + (place - mean) ** 2))
 
 
-@lru_cache(maxsize=128)
-def _at_the_mean(view: LoadView, masses: bytes) -> tuple[Array, Array]:
-    """Return sum u² / (1 + m² D D') and sum log(1 + m² D D') (n,) of ``masses``: asked for again for every load that
-    might be there.
+def log_ratio_if(true: float, masses: Array, squares: Array, own: Array, wide: Array) -> Array:
+    """Return the log likelihood ratio (r, n) of loads of ``masses`` (n,) kg against none in r views, if the data showed
+    a load of ``true`` kg at the mean place and nothing else; ``squares`` (r,) b'b, ``own`` and ``wide`` (r, n) of each
+    view `at_the_mean`.
     """
-    wide = 1 + np.frombuffer(masses)[:, None] ** 2 * view.strength
-    return (view.unit**2 / wide).sum(axis=1), np.log(wide).sum(axis=1)
+    shown = np.multiply.outer(squares, true * masses - 0.5 * masses**2)
+    return np.asarray(shown + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide))
 
 
 def _log_ratio(m: Array, shown: float, squares: float, surprise: Array, unit: Array, strength: Array) -> Array:

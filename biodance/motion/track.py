@@ -2,7 +2,8 @@
 trial's own cut-off.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -314,28 +315,51 @@ def track(body: Body, trial: Trial) -> Motion:
     >>> biodance.track(biodance.scale(session.subject, session["static"]), session["squat_1"])
     Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
-    if trial.markers is None or not trial.markers.time.size:
-        raise TrialRefused(
-            f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers."
+    worn = trial.markers if trial.markers is not None else Markers((), np.empty(0), np.empty((0, 0, 3)))
+    return Followed(body, worn).motion(trial)
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A ``body`` under the ``markers`` of one trial; its postures are searched when they are first asked for."""
+
+    body: Body
+    markers: Markers
+
+    @cached_property
+    def held(self) -> tuple[Body, tuple[str, ...]]:
+        """The body with the joints held that the markers leave open, and a warning that names them (`hold_open`)."""
+        return hold_open(self.body, self.markers)
+
+    @cached_property
+    def found(self) -> InverseKinematics:
+        """The postures nearest to the markers; raises `TrialRefused` where these determine none."""
+        return solve_ik(self.held[0], self.markers)
+
+    def motion(self, trial: Trial) -> Motion:
+        """Return the motion, low-passed as the settings of the ``trial`` say, see `track`."""
+        if not self.markers.time.size:
+            raise TrialRefused(
+                f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its "
+                "markers."
+            )
+        try:
+            (body, warning), found = self.held, self.found
+            rate = self.markers.rate if self.markers.time.size > 1 else 1.0
+            postures = upright_trunk(body, found.q, rate)
+            low_pass = motion_filter(trial.settings)
+            motion = smooth(body, self.markers.time, postures, settings=low_pass)
+        except TrialRefused as error:
+            raise TrialRefused(f"Trial {trial.name}: {error}") from error
+        determined, state = angle_states(body, self.markers, found.status, low_pass)
+        return replace(
+            motion,
+            residual=found.residual,
+            marker_names=found.marker_names,
+            determined=determined,
+            state=state,
+            notes=(*_notes(self.body, found), *warning),
         )
-    try:
-        followed, held = hold_open(body, trial.markers)
-        found = solve_ik(followed, trial.markers)
-        rate = trial.markers.rate if trial.markers.time.size > 1 else 1.0
-        postures = upright_trunk(followed, found.q, rate)
-        low_pass = motion_filter(trial.settings)
-        motion = smooth(followed, trial.markers.time, postures, settings=low_pass)
-    except TrialRefused as error:
-        raise TrialRefused(f"Trial {trial.name}: {error}") from error
-    determined, state = angle_states(followed, trial.markers, found.status, low_pass)
-    return replace(
-        motion,
-        residual=found.residual,
-        marker_names=found.marker_names,
-        determined=determined,
-        state=state,
-        notes=(*_notes(body, found), *held),
-    )
 
 
 _LEGS = ("hip", "knee", "ankle")
@@ -400,18 +424,20 @@ _FASTEST = 0.375  # Of the rate: from here to half of it lies the fastest quarte
 _STEP = 0.1  # Hz between the cut-offs that are tried
 
 
-def with_own_cutoff(trial: Trial, body: Body, markers: Markers) -> Trial:
-    """Return a ``trial`` as read with the cut-off that the prepared ``markers`` ask for, and a sentence on it; as it is
-    where a cut-off was set, a static posture is no movement, or the markers do not tell.
+def asked_cutoff(trial: Trial, at: Followed) -> float | None:
+    """Return the cut-off (Hz) that the prepared markers of a ``trial`` as read ask for; None where a cut-off was set, a
+    static posture is no movement, or the markers do not tell.
     """
     if trial.settings.filter.cutoff != "auto" or trial.role == "static":
-        return trial
+        return None
     try:
-        cutoff = own_cutoff(body, markers, motion_filter(trial.settings))
+        return own_cutoff(at, motion_filter(trial.settings))
     except BiodanceError:
-        return trial  # tracking meets the same markers, and says why
-    if cutoff is None:
-        return trial
+        return None  # tracking meets the same markers, and says why
+
+
+def with_cutoff(trial: Trial, cutoff: float) -> Trial:
+    """Return a ``trial`` as read with the ``cutoff`` (Hz) that its markers ask for, and a sentence on it."""
     said = (
         f"Cut-off of the low-pass: {cutoff:g} Hz, where the filtered markers of this trial lie nearest to the path of "
         "rigid segments."
@@ -420,8 +446,8 @@ def with_own_cutoff(trial: Trial, body: Body, markers: Markers) -> Trial:
     return replace(trial, settings=settings, history=(*trial.history, said))
 
 
-def own_cutoff(body: Body, markers: Markers, settings: LowPass) -> float | None:
-    """Return the cut-off (Hz) of a low-pass of the kind and order of ``settings`` at which ``markers`` that ``body``
+def own_cutoff(at: Followed, settings: LowPass) -> float | None:
+    """Return the cut-off (Hz) of a low-pass of the kind and order of ``settings`` at which the markers that a body
     follows are expected to err least; None where they are too few or too short to tell.
 
     No more than the usual 10 Hz: residuals are judged at 25 samples a second, which faster ones would upset.
@@ -431,12 +457,13 @@ def own_cutoff(body: Body, markers: Markers, settings: LowPass) -> float | None:
     TrialRefused
         The markers do not determine the posture.
     """
+    body, markers = at.body, at.markers
     rate = markers.rate if markers.time.size > 1 else 0.0
     low, high = max(1.0, _PERIODS * rate / max(markers.time.size, 1)), min(USUAL_CUTOFF, _FASTEST * rate)
     if low >= high:
         return None
-    followed, _ = hold_open(body, markers)
-    model = poses(followed, solve_ik(followed, markers).q)
+    followed, _ = at.held
+    model = poses(followed, at.found.q)
     worn = [k for k, name in enumerate(body.markers.names) if name in markers]
     unseen = np.array([np.isnan(markers[body.markers.names[k]]).any(axis=1).sum() for k in worn])
     columns = [k for k, count in zip(worn, unseen, strict=True) if count <= np.median(unseen)]

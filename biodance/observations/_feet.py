@@ -166,9 +166,13 @@ class FootPath:
 
     def drift(self, time: Array) -> Array:
         """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
-        velocity = self.velocity_at(time)
-        known = velocity[np.isfinite(velocity).all(axis=1)]
-        return np.median(known, axis=0) if len(known) else np.full(3, np.nan)
+        return median_known(self.velocity_at(time))
+
+
+def median_known(velocity: Array) -> Array:
+    """Return the median (3,) of the rows (n, 3) that are known, NaN without any."""
+    known = velocity[np.isfinite(velocity).all(axis=1)]
+    return np.median(known, axis=0) if len(known) else np.full(3, np.nan)
 
 
 def feet_of(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:

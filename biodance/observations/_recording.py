@@ -16,7 +16,7 @@ from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.upright import is_still
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
 from biodance.motion.soles import inside
-from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track_of
+from biodance.observations._feet import FootPath, Track, feet_of, median_known, pelvis_path, track_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
@@ -222,8 +222,8 @@ def _step(
 ) -> FootStep | None:
     """Return the step of one contact from ``first`` to ``last`` s; None where not just one foot stands there."""
     time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
-    over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
-    on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
+    over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet if _stands(foot, time)}
+    on = [foot for foot in feet if over.get(foot.side, -np.inf) > -_BESIDE]
     if len(on) != 1:
         return None
     (foot,), belt = on, on[0].drift(time)
@@ -272,14 +272,14 @@ def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
 
 def _stands(foot: FootPath, time: Array) -> bool:
     """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
-    drift = foot.drift(time)
-    off = np.linalg.norm(foot.velocity_at(time) - drift, axis=1)
+    drift = median_known(velocity := foot.velocity_at(time))
+    off = np.linalg.norm(velocity - drift, axis=1)
     known = np.isfinite(off)
     if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
         return False
-    heights = zip(foot.at(time), foot.lowest, strict=True)
-    flat = all(np.nanmedian(path[:, 2]) < lowest + _FLAT for path, lowest in heights)
-    return bool(np.linalg.norm(drift) < _STILL or flat)
+    return bool(np.linalg.norm(drift) < _STILL) or all(
+        np.nanmedian(path[:, 2]) < lowest + _FLAT for path, lowest in zip(foot.at(time), foot.lowest, strict=True)
+    )
 
 
 def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:

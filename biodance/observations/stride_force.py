@@ -63,9 +63,15 @@ class StrideForce(Observer):
     def _weights(self, seen: SeenTrial) -> tuple[Observation, ...]:
         if seen.pelvis is None or not seen.mass > 0:
             return ()
-        whole = [step for step in seen.steps if not step.overhang]
-        alone = [one for step in whole for one in (*self._alone(seen, step), *self._flown(seen, step))]
-        return (*alone, *(one for pair in _pairs(seen) for one in self._whole(seen, *pair)), *self._lasting(seen))
+        inside = [step for step in seen.steps if not step.overhang]
+        alone = [one for step in inside for one in (*self._alone(seen, step), *self._flown(seen, step))]
+        return (*alone, *self.whole(seen))
+
+    def whole(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return one mass and two horizontal forces for each whole step, and one mass of all strides on a belt."""
+        if seen.pelvis is None or not seen.mass > 0:
+            return ()
+        return (*(one for pair in _pairs(seen) for one in self._whole(seen, *pair)), *self._lasting(seen))
 
     def _lasting(self, seen: SeenTrial) -> list[Observation]:
         moving = [step for step in seen.steps if seen.belt(step) is not None]

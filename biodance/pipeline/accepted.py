@@ -40,7 +40,7 @@ from biodance.lab.plates.faults import DELAY, GAIN, OFFSET, PLATE_FAULTS
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, recorded_of, windows
 from biodance.pipeline.results import MendedCopy, SessionDiagnosis, SessionResult
-from biodance.pipeline.session import examine
+from biodance.pipeline.session import examine, followed
 from biodance.records import Array, Role, Session, Sip, Trial
 
 CORRECTED = "corrected"
@@ -131,7 +131,7 @@ def with_right_labels(
     while found:
         tell("examining a copy with the labels exchanged")
         trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
-        mended = examine(replace(result.session, trials=trials), reference=reference, known=result.known)
+        mended = followed(replace(result.session, trials=trials), reference=reference, known=result.known)
         worse = {
             after.name
             for before, after in zip(result.trials, mended.trials, strict=True)
@@ -191,7 +191,7 @@ def with_faults_undone(
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        result = examine(
+        result = followed(
             replace(result.session, trials=trials), reference=reference, known=result.known, earlier=result
         )
         recorded = recorded_of(result)

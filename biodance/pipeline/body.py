@@ -20,7 +20,7 @@ from biodance.motion.contact import carried_elsewhere
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.functional_joints import PLACED, JointGain, functional_joints, with_shown_joints
 from biodance.motion.track import track
-from biodance.pipeline.trial import attempt, track_trial
+from biodance.pipeline.trial import attempt
 from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, ShownJoints, Step, TrialResult
 from biodance.records import SIDES, Markers, Sip, Subject, Trial
 from biodance.settings import Settings
@@ -207,7 +207,7 @@ def _force_gain(plain: Body, one: TrialResult) -> list[ForceGain]:
     compared = one.comparison
     if compared is None or one.trial.role == "static" or not compared.used.any():
         return []
-    motion = attempt([], "track", lambda: track_trial(one.trial, plain))
+    motion = attempt([], "track", partial(track, plain, one.trial))
     if motion is None:
         return []
     left = (compared.measured - predict_wrench(plain, motion).value)[compared.used, :3]

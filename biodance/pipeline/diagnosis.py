@@ -29,6 +29,7 @@ from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import identified
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
@@ -71,7 +72,9 @@ def diagnose_session(
     if right is not None:
         result, recorded = right.result, recorded_of(right.result)
     mended, recorded = with_faults_undone(result, recorded, right, family, reference=reference, tell=tell)
-    result = result if mended is None else mended.result
+    if mended is not None:
+        mended = replace(mended, result=identified(mended.result, reference=reference))
+        result = mended.result
     found = _judged(result, recorded, family, reference=reference, tolerances=tolerances, tell=tell)
     whole = of_family(found.diagnosis, family)
     cases = found.inferred.search.rows.problem.cases if found.inferred and found.inferred.search.rows.problem else ()

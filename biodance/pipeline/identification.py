@@ -177,10 +177,12 @@ def weigh(session: Session, standing: QuietStanding | None) -> Weighing | None:
         return Weighing(standing.mass, _STANDING * standing.mass, WeighedBy.STANDING, (standing.trial,))
     mass = session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    strides = [one for trial in seen for one in StrideForce().observe(trial) if one.unit == "kg"]
-    whole = [(one.trial, one.value, one.sd) for one in strides if not one.what.endswith(", alone")]
+    strides = [one for trial in seen for one in StrideForce().whole(trial) if one.unit == "kg"]
+    found = _median([(one.trial, one.value, one.sd) for one in strides], WeighedBy.STRIDES)
+    if found is not None:
+        return found
     told = [(one.trial.name, one.newton.mass, one.newton.mass_sd) for one in seen if one.newton]
-    return _median(whole, WeighedBy.STRIDES) or _median(told, WeighedBy.NEWTON)
+    return _median(told, WeighedBy.NEWTON)
 
 
 def with_weighed_mass(session: Session) -> Session:

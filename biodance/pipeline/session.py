@@ -33,7 +33,7 @@ from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
-from biodance.records import Mask, Motion, Session
+from biodance.records import Mask, Session
 from biodance.threads import one_thread
 
 
@@ -59,17 +59,17 @@ def _examined(
     read: tuple[TrialResult, ...],
     body: Body | None,
     mass: float,
-    followed: tuple[Motion | None, ...],
+    earlier: tuple[TrialResult | None, ...],
     tell: Callable[[str], None],
 ) -> tuple[TrialResult, ...]:
-    """Return the trials tracked, where they are not ``followed`` already, and compared, with their checks; those that
-    Ctrl-C left undone say so.
+    """Return the trials tracked, where the same markers were not followed ``earlier``, and compared, with their checks;
+    those that Ctrl-C left undone say so.
     """
     results: list[TrialResult] = []
     try:
-        for k, (one, motion) in enumerate(zip(read, followed, strict=True), 1):
+        for k, (one, before) in enumerate(zip(read, earlier, strict=True), 1):
             tell(f"tracking {one.trial.name}, {k} of {len(read)}")
-            results.append(examine_trial(one, body, mass=mass, followed=motion))
+            results.append(examine_trial(one, body, mass=mass, before=before))
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
     return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
@@ -183,43 +183,39 @@ def examine(
     >>> result["squat_1"].motion
     Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
+    found = followed(session, reference=reference, known=known, corrections=corrections, earlier=earlier, tell=tell)
+    return identified(found, reference=reference, tell=tell)
+
+
+def followed(
+    session: Session,
+    *,
+    reference: SessionIdentification | None = None,
+    known: Body | None = None,
+    corrections: tuple[PlateCorrection, ...] = (),
+    earlier: SessionResult | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionResult:
+    """Return a session through all stages of `examine` but the last: `identified` does that, where somebody asks for
+    the masses of just this copy.
+    """
     reference_person(session.settings.table, session.subject)
     session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
     session = with_weighed_mass(session)
-    steps: list[Step] = []
     read = _prepared(session, tell)
     tell("scaling the body")
     before = earlier.placed if earlier is not None else None
     placed = _placed(session, read, known, (before, earlier.trials) if before and earlier else None)
-    body, prior, shown = placed.body, placed.prior, placed.shown
+    body, shown = placed.body, placed.shown
     if body is not None and reference is not None:
         refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
-    followed = (one.motion for one in earlier.trials) if earlier and placed is before else repeat(None, len(read))
-    done = _examined(read, body, session.subject.mass, tuple(followed), tell)
+    same = earlier.trials if earlier and placed is before else tuple(repeat(None, len(read)))
+    done = _examined(read, body, session.subject.mass, same, tell)
     if body is not None and placed.plain is not None:
         body, shown = with_forces(shown, placed.plain, body, done)
-    steps += placed.steps
+    steps = list(placed.steps)
     standing = best_standing(done)
-    weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
-    identification, limits = None, session.settings.checks
-    checks = (*mass_check(session.subject, weighed, limits), *standing_check(standing, limits))
-    if body is not None and can_identify(done):
-        tell("identifying the segments")
-        work = partial(
-            identify_trials,
-            body,
-            done,
-            name=session.folder.name,
-            reference=reference,
-            checks=checks,
-            prior=prior,
-            corrections=corrections,
-            weighed=weighed,
-        )
-        try:
-            identification = attempt(steps, "identify", work)
-        except KeyboardInterrupt:
-            steps.append(_stop("the segments were identified"))
+    weighed, limits = attempt(steps, "weighing", lambda: weigh(session, standing)), session.settings.checks
     return SessionResult(
         session=session,
         subject=session.subject,
@@ -227,18 +223,48 @@ def examine(
         body_source=placed.source,
         steps=tuple(steps),
         trials=done,
-        checks=checks,
+        checks=(*mass_check(session.subject, weighed, limits), *standing_check(standing, limits)),
         standing=standing,
         weighed=weighed,
-        still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
-        identification=identification,
-        more_stills=_stills(body, done, identification) if body else (),
-        prior=prior,
+        still=None,
+        identification=None,
+        prior=placed.prior,
         shown_joints=shown,
         known=known,
         corrections=corrections,
         placed=placed,
     )
+
+
+@one_thread()
+def identified(
+    result: SessionResult,
+    *,
+    reference: SessionIdentification | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionResult:
+    """Return a session that was `followed` with what its segments weigh, and its worst frames."""
+    body, done, steps, identification = result.body, result.trials, list(result.steps), None
+    if body is not None and can_identify(done):
+        tell("identifying the segments")
+        work = partial(
+            identify_trials,
+            body,
+            done,
+            name=result.session.folder.name,
+            reference=reference,
+            checks=result.checks,
+            prior=result.prior,
+            corrections=result.corrections,
+            weighed=result.weighed,
+        )
+        try:
+            identification = attempt(steps, "identify", work)
+        except KeyboardInterrupt:
+            steps.append(_stop("the segments were identified"))
+    still = attempt([], "still", lambda: still_of(body, done)) if body else None
+    more = _stills(body, done, identification) if body else ()
+    return replace(result, steps=tuple(steps), identification=identification, still=still, more_stills=more)
 
 
 def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:

@@ -21,7 +21,7 @@ from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.dynamics import compare, predict_wrench
 from biodance.motion.newton import quiet_standing
 from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
-from biodance.motion.track import track, with_own_cutoff
+from biodance.motion.track import Followed, asked_cutoff, with_cutoff
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit
 from biodance.records import LeftOut, Motion, Sip, Trial, runs
 from biodance.records.attention import seconds_left_out
@@ -72,15 +72,20 @@ def prepare_trial(trial: Trial) -> TrialResult:
     return TrialResult(done or trial, tuple(steps), gaps_of(trial), recorded=trial)
 
 
-def filtered_as_it_asks(read: TrialResult, body: Body | None) -> Trial:
+def filtered_as_it_asks(read: TrialResult, at: Followed | None, before: TrialResult | None = None) -> Trial:
     """Return a prepared trial whose forces and joint coordinates have the cut-off that its own markers ask for under
-    ``body``; as it is where they ask for none, see `with_own_cutoff`.
+    the body that follows them, which is known where the same markers were examined ``before``; as it is where they ask
+    for none, see `asked_cutoff`.
     """
     trial = read.trial
-    if body is None or trial.markers is None or not trial.marker_set or read.recorded is None:
+    if at is None or not trial.marker_set or read.recorded is None:
         return trial
-    asked = with_own_cutoff(read.recorded, body, trial.markers)
-    return trial if asked is read.recorded else prepare(asked)
+    if before is None or read.recorded.settings.filter.cutoff != "auto":
+        cutoff = asked_cutoff(read.recorded, at)
+    else:
+        known = before.trial.settings.filter.cutoff
+        cutoff = None if known == "auto" else known
+    return trial if cutoff is None else prepare(with_cutoff(read.recorded, cutoff))
 
 
 def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> MarkerFit:
@@ -147,8 +152,8 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
     )
 
 
-def track_trial(trial: Trial, body: Body | None) -> Motion:
-    """Return the motion of ``body`` under the trial's markers.
+def track_trial(trial: Trial, at: Followed | None) -> Motion:
+    """Return the motion of the body that follows the trial's markers; None: there is no body, or nothing to follow.
 
     Raises
     ------
@@ -163,21 +168,25 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
             "follow them. Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that "
             "form and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
-    if body is None:
+    if at is None:
         raise TrialRefused(f"Trial {trial.name}: there is no body to follow the markers (see the session).")
-    return track(body, trial)
+    return at.motion(trial)
 
 
-def examine_trial(read: TrialResult, body: Body | None, *, mass: float, followed: Motion | None = None) -> TrialResult:
+def examine_trial(
+    read: TrialResult, body: Body | None, *, mass: float, before: TrialResult | None = None
+) -> TrialResult:
     """Take a prepared trial (`prepare_trial`) through the remaining steps; ``mass`` kg of the body, NaN = unknown;
-    ``followed`` the motion of the body where it has followed these markers before.
+    ``before`` the same trial, examined with other forces: the body has followed these markers.
 
     What has no markers or no body is not tracked, what has no plates is not compared: each is a step with its reason.
     """
     if not read.usable:
         return read
-    trial, steps = filtered_as_it_asks(read, body), list(read.steps)
-    motion = attempt(steps, "track", lambda: followed if followed is not None else track_trial(trial, body))
+    worn, steps = read.trial.markers, list(read.steps)
+    at = Followed(body, worn) if body is not None and worn is not None else None
+    trial, followed = filtered_as_it_asks(read, at, before), before.motion if before else None
+    motion = attempt(steps, "track", lambda: followed if followed is not None else track_trial(trial, at))
     groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
     fit = marker_fit(motion, groups) if motion else None
     if not trial.plates:

@@ -207,22 +207,26 @@ def _turn_slope(phi: Array) -> Array:
     return out
 
 
+_FORMS = np.array(
+    [
+        2 * np.eye(3) * (i == j) - np.outer(np.eye(3)[i], np.eye(3)[j]) - np.outer(np.eye(3)[j], np.eye(3)[i])
+        for i, j in TENSOR
+    ]
+)
+"""(6, 3, 3) A: the elements of |d|² 1 - d d' are d' A d / 2 in the order of `TENSOR`."""
+
+
 def _displacement(phi: Array, own: Array) -> Array:
     """Return the second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): its mean
-    and its variance.
+    and its variance: with F = m A Sigma (`_FORMS`) half the trace of F, and half those of F F'.
     """
     mass, com = phi[0], phi[1:4] / phi[0]
     slope = np.zeros((3, 10))
     slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass
     spread = slope @ own @ slope.T
-    forms = []
-    for i, j in TENSOR:
-        form = 2 * mass * np.eye(3) * (i == j)
-        form[i, j] -= mass
-        form[j, i] -= mass
-        forms.append(form @ spread)
-    mean = np.array([0.5 * np.trace(form) for form in forms])
-    variance = np.array([[0.5 * np.trace(a @ b) for b in forms] for a in forms])
+    forms = mass * _FORMS @ spread
+    mean = 0.5 * np.einsum("kii->k", forms)
+    variance = 0.5 * np.einsum("kij,lji->kl", forms, forms)
     out = np.zeros((10, 10))
     out[4:, 4:] = variance + np.outer(mean, mean)
     return out

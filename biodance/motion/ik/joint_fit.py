@@ -16,7 +16,8 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.ik.joint_unknowns import FAULTY, SIZE, JointUnknowns, own_unknowns
-from biodance.motion.kinematics import Poses, neighbours, place_jacobian, poses
+from biodance.motion.ik.slides import with_slides, without_slides
+from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.records import Array, Index, Markers
 
 # With theta the free unknowns at the found minimum, g and H gradient and information of the cost there, P the
@@ -192,15 +193,11 @@ def beside_sliding_skin(
     at = _Linear.of(body, postures, found.q, found.solved, noise=noise)
     joints = at.left_open(unknowns.slope(body, stand, at.pose, at.points, found.theta))
     kept = np.flatnonzero(body.markers.weight > 0)
-    markers = at.left_open(_places(body, at.pose, kept))
+    rows = np.concatenate([at.left_open(_places(body, at.pose, kept)), joints, at.residual[..., None]], axis=2)
     angles = (found.q[found.solved] - stand)[:, body.nq - len(body.joints) :]
-    beside = np.repeat(neighbours(body)[:, list(body.markers.segment)][:, kept] > 0, 3, axis=1)
-    parts = [markers[:, :, near] * angle[:, None, None] for near, angle in zip(beside, angles.T, strict=True)]
-    slides = np.concatenate(parts, axis=2).reshape(markers.shape[0] * markers.shape[1], -1)
-    rows = np.concatenate([markers, joints, at.residual[..., None]], axis=2).reshape(len(slides), -1)
-    every, shared, own = rows.T @ rows, slides.T @ rows, slides.T @ slides
-    left = _without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
-    square = _without_slides(every, shared, own, float(left) * alike)
+    every, shared, own = with_slides(body, np.swapaxes(rows, 1, 2) @ rows, angles, kept)
+    left = without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
+    square = without_slides(every, shared, own, float(left) * alike)
     each, place = 3 * len(kept), np.arange(3 * len(kept)).reshape(-1, 3)
     prior, slope = unknowns.prior(found.theta)
     of_joints = slice(each, each + SIZE)
@@ -208,12 +205,6 @@ def beside_sliding_skin(
     names = tuple(body.markers.names[marker] for marker in kept)
     inside = square[place[:, :, None], place[:, None, :]]
     return cost, MarkerSlopes(names, square[place, -1], inside, square[:each, of_joints].reshape(-1, 3, SIZE))
-
-
-def _without_slides(square: Array, shared: Array, own: Array, noise: float) -> Array:
-    """Return the products ``square`` (p, p) of rows with slides taken out: ``own`` (s, s), ``shared`` (s, p)."""
-    inner = own + noise * error_size("slide", "marker") ** -2 * np.eye(len(own))
-    return np.asarray((square - shared.T @ np.linalg.solve(inner, shared)) / noise)
 
 
 def _places(body: Body, pose: Poses, kept: Index) -> Array:

@@ -179,8 +179,10 @@ def plain_values(value: object) -> Any:
     """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
     None.
     """
-    if isinstance(value, float) and not isinstance(value, np.generic):
+    if type(value) is float:
         return value if math.isfinite(value) else None
+    if type(value) is str or type(value) is int or value is None:
+        return value
     if isinstance(value, Mapping):
         return {str(key): plain_values(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -189,7 +191,7 @@ def plain_values(value: object) -> Any:
         return [plain_values(item) for item in value]
     if isinstance(value, np.generic):
         return plain_values(value.item())
-    return value if value is None or isinstance(value, str | int | bool) else str(value)
+    return value if isinstance(value, int) else str(value)
 
 
 def to_text(document: object) -> str:
