@@ -4,19 +4,19 @@ from dataclasses import replace
 
 import pytest
 import two_plates
+from shared_markers import examined_beside
 from two_plates import changed, exchanged, foreign, late, session, weak
 
 from biodance.effects import Recorded
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
-from biodance.pipeline.session import examine
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
     """Return what is found in the session with a change in it."""
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
-    return diagnose_session(examine(changed(session(), *change) if change else session()))
+    return diagnose_session(examined_beside(changed(session(), *change) if change else session()))
 
 
 def names(found: SessionDiagnosis) -> list[tuple[str, str, tuple[str, ...]]]:
@@ -35,7 +35,7 @@ def test_a_mass_is_wrong_only_where_one_was_declared(declared, monkeypatch):
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
     visit = session()
     subject = replace(visit.subject, mass=1.08 * visit.subject.mass, guessed=() if declared else ("mass",))
-    result = examine(replace(visit, subject=subject))
+    result = examined_beside(replace(visit, subject=subject))
     assert any(one.effect == "body_mass" for one in diagnose_session(result).findings) is declared
     assert any(one.effect == "body_mass" for one in diagnose_session(result, effects=["body_mass"]).findings)
 
