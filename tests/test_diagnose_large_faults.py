@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import two_plates
 from shared_markers import examined_beside
@@ -11,6 +12,7 @@ from biodance.effects import Recorded
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.session import examine
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
@@ -21,6 +23,20 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
 
 def names(found: SessionDiagnosis) -> list[tuple[str, str, tuple[str, ...]]]:
     return [(one.effect, one.target, one.trials) for one in found.findings]
+
+
+def test_beside_a_session_with_the_same_markers_all_is_found_as_alone(monkeypatch):
+    """What these tests share of one session is what each would have found by itself."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    wrong, first = changed(session(), weak), examined_beside(session())
+    beside, alone = examined_beside(wrong), examine(wrong)
+    assert beside.placed is first.placed
+    assert alone.placed is not first.placed
+    np.testing.assert_array_equal(beside.body.sip.phi, alone.body.sip.phi)
+    for one, other in zip(beside.trials, alone.trials, strict=True):
+        np.testing.assert_array_equal(one.motion.q, other.motion.q)
+        np.testing.assert_array_equal(one.comparison.simulated, other.comparison.simulated)
+        np.testing.assert_array_equal(one.comparison.rms, other.comparison.rms)
 
 
 def test_nothing_is_undone_without_a_fault(monkeypatch):
