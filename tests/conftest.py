@@ -4,12 +4,17 @@ would keep; one thread of linear algebra; the folder with real recordings.
 
 import os
 import tomllib
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 import biodance.pipeline.front  # noqa: F401
+from biodance.lab.session.read import read_session
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+from biodance.records import Session
 from biodance.threads import one_thread
 
 
@@ -29,6 +34,28 @@ def data() -> Path:
     if not folder:
         pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
     return Path(folder)
+
+
+@cache
+def _read(folder: Path) -> Session:
+    return read_session(folder)
+
+
+@cache
+def _examined(folder: Path) -> SessionResult:
+    return examine(_read(folder))
+
+
+@pytest.fixture
+def recorded(data: Path) -> Callable[[str], Session]:
+    """Return what gives a real session by its name: each is read once for the tests of all files."""
+    return lambda name: _read(data / name)
+
+
+@pytest.fixture
+def recording(data: Path) -> Callable[[str], SessionResult]:
+    """Return what gives the result of a real session by its name: each is examined once for the tests of all files."""
+    return lambda name: _examined(data / name)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shared_markers import examined_beside, markers_asked_once
 
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.effects import discrete_effects, effects
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine
 from biodance.records import Array, Plate, Subject
 from biodance.virtual_lab.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
@@ -42,13 +42,14 @@ def hidden(
 def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
     """Read and track a session; what it says about the body is not needed here."""
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
-    return examine(read_session(folder))
+    return examined_beside(read_session(folder))
 
 
 def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, ...] = ()) -> Diagnosis:
     """Diagnose the session of a folder, with all effects but those ``without``."""
     chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in without) if without else None
-    return diagnose_session(examined(folder, monkeypatch), effects=chosen).diagnosis
+    with markers_asked_once():
+        return diagnose_session(examined(folder, monkeypatch), effects=chosen).diagnosis
 
 
 def standing_recording(folder: Path, *texts: str, visit: LabVisit) -> Path:

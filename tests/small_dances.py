@@ -2,9 +2,13 @@
 that is cut short.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 import numpy as np
+import pytest
+from matplotlib.figure import Figure
 
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
@@ -35,3 +39,15 @@ def small_dance() -> Dance:
     x = np.array([stand, raised])
     via = x[:1, None] + np.array([[0.21], [0.79]]) * np.diff(x, axis=0)[:, None]
     return Dance("one_segment", BODY, x, stances, np.ones(2), via, np.array([2.0]), (feet_in_move(*stances),), 0)
+
+
+@contextmanager
+def without_pictures(*, figures: bool = False) -> Iterator[None]:
+    """Let dances be written without their shaded postures, which `test_pipeline_stills` draws, and with empty figures
+    unless they are asked for: `test_dance_command` draws all of a dance.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("biodance.report.dance.sheet_png", lambda stills: None)
+        for name in () if figures else ("postures", "criterion", "zmp", "expectation"):
+            patch.setattr(f"biodance.report.dance.{name}_figure", lambda *_: Figure())
+        yield

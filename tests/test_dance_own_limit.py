@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_dances import SHORT_SEARCH
+from small_dances import SHORT_SEARCH, without_pictures
 
 from biodance.body.human.human import human
 from biodance.cli import run
@@ -88,9 +88,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:
     protocol, out = tmp_path / "tiny.toml", tmp_path / "out"
     protocol.write_text(f"{PROTOCOL}[limits.ceiling]\nheight = {height}\n")
-    code = run(
-        ["dance", "--sex", "F", "--height", "1.75", "--mass", "65", "--protocol", str(protocol), "--out", str(out)]
-    )
+    words = ["--sex", "F", "--height", "1.75", "--mass", "65", "--protocol", str(protocol), "--out", str(out)]
+    with without_pictures():
+        code = run(["dance", *words])
     return code, json.loads((out / "results.json").read_text()), out
 
 

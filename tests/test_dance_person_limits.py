@@ -237,7 +237,7 @@ def lifts(dance: Dance) -> float:
 
 def test_an_arm_that_is_lifted_by_70_degrees_comes_no_farther_by_any_way(tmp_path: Path) -> None:
     subject = Subject(65.0, 1.75, "F", 33.0)
-    plan = replace(read_plan("patient"), blocks=(("parallel", 8),))
+    plan = replace(read_plan("patient"), blocks=(("parallel", 4),))
     body = dancer(subject, plan)
     person = written(tmp_path, "[at_most_deg]\nleft_arm_lift = 70\n")
     seen = {}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from direct_information import information
 from robots import biped
+from small_dances import without_pictures
 
 from biodance.body.export import write_model
 from biodance.body.human.human import human
@@ -47,7 +48,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
     (place / "tiny.toml").write_text(PROTOCOL)
     write_model(hoap3(), place / "hoap3.urdf", format="urdf")
     words = ["--urdf", str(place / "hoap3.urdf"), *FEET, "--protocol", str(place / "tiny.toml"), "--seed", "1"]
-    return place, run(["dance", *words, "--out", str(place / "out")])
+    with without_pictures(figures=True):
+        return place, run(["dance", *words, "--out", str(place / "out")])
 
 
 def test_planted_feet_stay_and_slopes_are_exact() -> None:

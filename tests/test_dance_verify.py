@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_dances import BODY, small_dance
+from small_dances import BODY, small_dance, without_pictures
 
 from biodance.cli import run
 from biodance.dance.dance import Dance
@@ -182,7 +182,8 @@ def test_the_dance_on_disk_knows_that_it_is_not_safe(result: DanceResult, tmp_pa
 
 
 def test_nothing_that_leads_is_written_of_it(result: DanceResult, tmp_path: Path) -> None:
-    found = write_dance(result, tmp_path)
+    with without_pictures():
+        found = write_dance(result, tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert not LEADING & names
     assert {"dance.npz", "results.json", "margins.md"} <= names
@@ -190,7 +191,8 @@ def test_nothing_that_leads_is_written_of_it(result: DanceResult, tmp_path: Path
 
 
 def test_despite_that_it_heads_the_cards_and_each_of_them(result: DanceResult, tmp_path: Path) -> None:
-    write_dance(result, tmp_path, despite=True)
+    with without_pictures():
+        write_dance(result, tmp_path, despite=True)
     assert {path.name for path in tmp_path.iterdir()} >= LEADING
     cards = (tmp_path / "cues.html").read_text()
     body = cards[cards.index("<h1>") :]
@@ -219,7 +221,8 @@ def test_no_page_leads_through_it_unless_somebody_says_so(
 def test_a_safe_dance_says_nothing(result: DanceResult, tmp_path: Path) -> None:
     assert not_safe(small_dance()) == ()
     safe = replace(result, dance=small_dance(), margins=())
-    write_dance(safe, tmp_path)
+    with without_pictures():
+        write_dance(safe, tmp_path)
     assert {path.name for path in tmp_path.iterdir()} >= LEADING
     assert all("NOT SAFE" not in (tmp_path / name).read_text() for name in ("cues.md", "cues.html"))
 

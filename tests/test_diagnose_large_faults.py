@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import two_plates
+from shared_markers import examined_beside
 from two_plates import changed, exchanged, foreign, late, session, weak
 
 from biodance.effects import Recorded
@@ -16,11 +18,25 @@ from biodance.pipeline.session import examine
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
     """Return what is found in the session with a change in it."""
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
-    return diagnose_session(examine(changed(session(), *change) if change else session()))
+    return diagnose_session(examined_beside(changed(session(), *change) if change else session()))
 
 
 def names(found: SessionDiagnosis) -> list[tuple[str, str, tuple[str, ...]]]:
     return [(one.effect, one.target, one.trials) for one in found.findings]
+
+
+def test_beside_a_session_with_the_same_markers_all_is_found_as_alone(monkeypatch):
+    """What these tests share of one session is what each would have found by itself."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    wrong, first = changed(session(), weak), examined_beside(session())
+    beside, alone = examined_beside(wrong), examine(wrong)
+    assert beside.placed is first.placed
+    assert alone.placed is not first.placed
+    np.testing.assert_array_equal(beside.body.sip.phi, alone.body.sip.phi)
+    for one, other in zip(beside.trials, alone.trials, strict=True):
+        np.testing.assert_array_equal(one.motion.q, other.motion.q)
+        np.testing.assert_array_equal(one.comparison.simulated, other.comparison.simulated)
+        np.testing.assert_array_equal(one.comparison.rms, other.comparison.rms)
 
 
 def test_nothing_is_undone_without_a_fault(monkeypatch):
@@ -35,7 +51,7 @@ def test_a_mass_is_wrong_only_where_one_was_declared(declared, monkeypatch):
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
     visit = session()
     subject = replace(visit.subject, mass=1.08 * visit.subject.mass, guessed=() if declared else ("mass",))
-    result = examine(replace(visit, subject=subject))
+    result = examined_beside(replace(visit, subject=subject))
     assert any(one.effect == "body_mass" for one in diagnose_session(result).findings) is declared
     assert any(one.effect == "body_mass" for one in diagnose_session(result, effects=["body_mass"]).findings)
 

@@ -10,10 +10,26 @@ from docstrings import faults, public
 from small_dances import small_dance
 
 import biodance
+from biodance.pipeline import diagnosis, front
 
 SLOW = ("examine", "identify", "diagnose", "register")
 """What an example asks for again with the same arguments is computed once."""
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def both(result):
+    """Return what a visit says of the body, and its diagnosis, which the identification asks for as well: once."""
+    diagnosed, kept = front.diagnose_session, []
+
+    def once(visit, **how):
+        if not kept:
+            kept.append(diagnosed(visit, **how))
+        return kept[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for place in (front, diagnosis):
+            patch.setattr(place, "diagnose_session", once)
+        return biodance.identify(result), biodance.diagnose(result)
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +45,12 @@ def names(tmp_path_factory):
         patch.setattr(biodance, name, cache(getattr(biodance, name)))
     session = biodance.read_session("visit")
     result = biodance.examine(session)
+    identified, found = both(result)
     shared = {
         "session": session,
         "result": result,
-        "identified": biodance.identify(result),
-        "found": biodance.diagnose(result),
+        "identified": identified,
+        "found": found,
         "registered": biodance.register("visit/dance_1.c3d", "visit/dance_1.c3d"),
     }
     small_dance().save("dance.npz")

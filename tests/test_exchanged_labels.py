@@ -2,6 +2,7 @@
 mended copies.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +23,7 @@ from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels, write_mended
 from biodance.pipeline.judged_trials import recorded_of
-from biodance.pipeline.session import examine
+from biodance.pipeline.results import SessionResult
 from biodance.records import Markers, Session, Source, Subject, Trial
 
 HEAD = (("LFHD", "RFHD"), ("LBHD", "RBHD"))
@@ -231,14 +232,18 @@ def test_an_exchange_of_some_frames_is_put_right_in_a_copy_and_nothing_else(data
 
 
 @pytest.mark.parametrize("child", ["HC002D", "HC036A"])
-def test_swinging_arms_are_no_exchanged_hands_and_accepting_writes_no_label(child: str, data: Path) -> None:
-    result = examine(read_session(data / "biomechzoo" / child))
+def test_swinging_arms_are_no_exchanged_hands_and_accepting_writes_no_label(
+    child: str, recording: Callable[[str], SessionResult]
+) -> None:
+    result = recording(f"biomechzoo/{child}")
     assert with_right_labels(result, recorded_of(result), tell=lambda text: None) is None
 
 
-def test_accepting_writes_what_it_says_and_nothing_else(data: Path, tmp_path: Path) -> None:
-    session = read_session(data / "biomechzoo/HC055A")
-    result = examine(session)
+def test_accepting_writes_what_it_says_and_nothing_else(
+    recording: Callable[[str], SessionResult], tmp_path: Path
+) -> None:
+    result = recording("biomechzoo/HC055A")
+    session = result.session
     right = with_right_labels(result, recorded_of(result), tell=lambda text: None)
     assert {name: set(pairs) for name, pairs in right.exchanged.items()} == {"HC055A34": set(map(sorted_pair, HEAD))}
     written, refused = write_mended(session, right, tmp_path)
@@ -246,9 +251,7 @@ def test_accepting_writes_what_it_says_and_nothing_else(data: Path, tmp_path: Pa
     assert written[0].what == "names exchanged: LFHD and RFHD, LBHD and RBHD"
     assert refused == ()
     assert [path.name for path in tmp_path.rglob("*.c3d")] == ["HC055A34.c3d"]
-    before, after = (
-        next(t for t in one.trials if t.name == "HC055A34").fit for one in (examine(session), right.result)
-    )
+    before, after = (next(t for t in one.trials if t.name == "HC055A34").fit for one in (result, right.result))
     assert after.total_rms < 0.4 * before.total_rms
 
 

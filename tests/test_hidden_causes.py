@@ -8,12 +8,14 @@ one of the others in turn), ``make hidden PART=all`` in all three, ``PART=2/7`` 
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hidden_faults import SUBJECT, TRIALS, hidden
+from shared_markers import markers_asked_once
 
 from biodance.cli import run
 from biodance.records import Subject
@@ -115,6 +117,13 @@ def assert_named(document: dict[str, Any], hidden: Hidden) -> None:
     if hidden.name not in UNGAINED:
         assert first["gain"]["trials"], "no gain was measured"
         assert first["gain"]["ci95"][0] > 0, "no gain on trials that were kept"
+
+
+@pytest.fixture(autouse=True)
+def _what_only_markers_tell_is_found_once() -> Iterator[None]:
+    """Let sessions of a person in which only forces are wrong share what their markers tell."""
+    with markers_asked_once():
+        yield
 
 
 @pytest.mark.parametrize(("who", "text"), asked())

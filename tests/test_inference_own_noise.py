@@ -1,7 +1,7 @@
 """The noise of a session as it shows it: of rows that were drawn with noise of a known size, and of real walks."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +12,8 @@ from biodance.effects import causes
 from biodance.inference.own_noise import own_noise
 from biodance.inference.rows import rows_of
 from biodance.inference.session import see
-from biodance.lab.session.read import read_session
 from biodance.pipeline.judged_trials import chosen_windows
-from biodance.pipeline.session import examine
+from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
@@ -82,9 +81,11 @@ def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
 
 
 @pytest.mark.parametrize("name", ["biomechzoo/HC032A", "opensim_models/raj_walk", "c3d_parser_Sydney"])
-def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(name: str, data: Path) -> None:
+def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
+    name: str, recording: Callable[[str], SessionResult]
+) -> None:
     """A session each of three laboratories: in most bands and channels, not in all."""
-    result = examine(read_session(data / name))
+    result = recording(name)
     windows, known = chosen_windows(result.trials), causes()
     own = own_tolerances(result.body, windows, result.session.trials).tolerances
     seen = see(result.body, windows, own, known, None)

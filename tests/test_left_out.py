@@ -1,14 +1,14 @@
 """What the gates took out of a trial is counted by its reason and stands beside what was judged."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hidden_faults import SUBJECT, examined
 
-from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.pipeline.session import examine
+from biodance.pipeline.results import SessionResult
 from biodance.records import LeftOut
 from biodance.records.attention import Judged, seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
@@ -53,8 +53,10 @@ def test_squats_whose_forces_come_late_are_not_judged(tmp_path: Path, monkeypatc
     assert 0.0 < slow.seconds == result["slow_squat"].compared_s
 
 
-def test_every_second_of_a_real_walk_is_judged_or_left_out_for_a_reason(data: Path) -> None:
-    result = examine(read_session(data / "biomechzoo" / "HC050A"))
+def test_every_second_of_a_real_walk_is_judged_or_left_out_for_a_reason(
+    recording: Callable[[str], SessionResult],
+) -> None:
+    result = recording("biomechzoo/HC050A")
     for one in result.trials:
         left = sum(one.left_out.values())
         assert one.compared_s + left == pytest.approx(one.motion.time.size / one.motion.rate, abs=0.015)

@@ -1,16 +1,15 @@
 """Joint moments take an identified body only where trials kept from the fit prove it."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from identified_sessions import session_result
 
-from biodance.lab.session.read import read_session
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import session_movement
-from biodance.pipeline.session import examine
+from biodance.pipeline.results import SessionResult
 
 
 def with_gain(force: tuple[float, float], moment: tuple[float, float]) -> SessionIdentification:
@@ -40,9 +39,9 @@ def test_without_kept_trials_nothing_is_proven() -> None:
     assert (moved.parameters, moved.mass) == ("table", pytest.approx(62.0))
 
 
-def test_clinical_walks_without_kept_trials_use_the_table(data: Path) -> None:
+def test_clinical_walks_without_kept_trials_use_the_table(recording: Callable[[str], SessionResult]) -> None:
     """Five walks of a patient were all fitted: trunk and head came out at 13.5 kg, where the table has 19.7."""
-    result = examine(read_session(data / "c3d_parser_Sydney"))
+    result = recording("c3d_parser_Sydney")
     moved = session_movement(result)
     assert result.identification is not None
     assert moved.parameters == "table"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hidden_faults import hidden
 from identified_sessions import RATE, body, movement, truth
+from shared_markers import markers_asked_once
 
 from biodance.cli import run
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
@@ -38,7 +39,9 @@ CORNERS = np.array([[0.6, 0.5, 0.0], [0.2, 0.5, 0.0], [0.2, -0.1, 0.0], [0.6, -0
 
 @pytest.fixture(scope="module", autouse=True)
 def _the_same_recordings_are_diagnosed_once() -> Iterator[None]:
-    """Let `report` have what `identify` found in the same recordings: both ask the same function for it."""
+    """Let `report` have what `identify` found in the same recordings: both ask the same function for it; and sessions
+    with the same markers what these tell.
+    """
     known: dict[tuple[str, ...], tuple[SessionResult, SessionDiagnosis | None]] = {}
     diagnosed = diagnosis.diagnosed_and_corrected
 
@@ -49,7 +52,7 @@ def _the_same_recordings_are_diagnosed_once() -> Iterator[None]:
             known[key] = diagnosed(result, **how)
         return known[key]
 
-    with pytest.MonkeyPatch.context() as patch:
+    with markers_asked_once(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnosis, "diagnosed_and_corrected", once)
         yield
 

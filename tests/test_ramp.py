@@ -5,13 +5,14 @@ origin on the floor, becomes Mx - s Mz (likewise with y). That is exact, whateve
 becomes one up or down a ramp, whose person is bent by the ramp's angle.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import biodance
+from biodance.pipeline.results import SessionResult
 from biodance.records import Trial
 
 
@@ -32,12 +33,13 @@ def tilted(trial: Trial, slope: float) -> Trial:
 
 
 @pytest.mark.parametrize("degrees", [5.0, -5.0])
-def test_a_walk_on_a_ramp_is_judged_as_on_the_level(data: Path, degrees: float) -> None:
-    level = biodance.read_session(data / "biomechzoo" / "HC032A")
+def test_a_walk_on_a_ramp_is_judged_as_on_the_level(recording: Callable[[str], SessionResult], degrees: float) -> None:
+    flat = recording("biomechzoo/HC032A")
+    level = flat.session
     trials = tuple(
         one if one.role == "static" else tilted(one, float(np.tan(np.radians(degrees)))) for one in level.trials
     )
-    results = [biodance.examine(one) for one in (level, replace(level, trials=trials))]
+    results = [flat, biodance.examine(replace(level, trials=trials))]
     for flat, ramp in zip(*(one.trials for one in results), strict=True):
         assert ramp.motion is not None
         assert flat.motion is not None

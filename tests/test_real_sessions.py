@@ -3,36 +3,21 @@ there is none.
 """
 
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from biodance.diagnosis.diagnosis import ABOUT
-from biodance.lab.session.read import read_session
 from biodance.pipeline.attention import is_well
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.judged_trials import failed_checks
 from biodance.pipeline.movement import describe_movement
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine
 
 RATE = 100.0
 
 
 Recording = Callable[[str], SessionResult]
-
-
-@cache
-def examined(folder: Path) -> SessionResult:
-    return examine(read_session(folder))
-
-
-@pytest.fixture
-def recording(data: Path) -> Recording:
-    """Return what gives the result of a real session by its name."""
-    return lambda name: examined(data / name)
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from biodance.records import Motion
 from biodance.uncertainty.caution import widened_prior
 from biodance.virtual_lab.person.person import make_person, with_prostheses
 
-TRIALS = ("static", *(f"move_{n}" for n in range(1, 9)), "squat_1")
+TRIALS = ("static", "move_1", "move_3", "move_5", "squat_1")
 LESS = 2.0
 
 
