@@ -111,19 +111,15 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
         plan = replace(plan, seat_height=max(least, person.seat_height))
     own = replace(body, limits=limits)
     plan = plan.with_limits(_own_limits(body, own, person))
-    hanging = _hanging(plan)
+    # arms that are lifted too little to be kept away from the trunk by people who copy imprecisely hang
+    lifts = [limit for limit in plan.limits if isinstance(limit, ArmLift)]
+    reach = {side: min([one.reach(side) for one in lifts], default=180.0) for side in SIDES}
+    hanging = tuple(side for side in SIDES if reach[side] < _ASKED and side not in plan.holds)
     notes += [
         f"The {side} arm hangs and is asked for nothing: it is lifted by less than {_ASKED:g} degrees."
         for side in hanging
     ]
     return own, replace(plan, hanging=hanging), tuple(notes)
-
-
-def _hanging(plan: Plan) -> tuple[str, ...]:
-    """Return the arms that are lifted too little to be kept away from the trunk by people who copy imprecisely."""
-    lifts = [limit for limit in plan.limits if isinstance(limit, ArmLift)]
-    reach = {side: min([one.reach(side) for one in lifts], default=180.0) for side in SIDES}
-    return tuple(side for side in SIDES if reach[side] < _ASKED and side not in plan.holds)
 
 
 def _check_standing(plan: Plan, person: PersonLimits) -> None:
