@@ -23,7 +23,6 @@ ONE_ALGORITHM = {
     "batch/run.py": "an archive: what is to do, by whom, and what is done",
     "batch/work.py": "one session in its own process, and its outcome",
     "body/human/measures.py": "what a subject measures: the posture of the static trial, typed sizes, the markers' own",
-    "report/dance.py": "the files that a designed dance is written to",
     "body/human/human.py": "the human Body and the prior of its masses",
     "body/human/skeleton.py": "the joint tree of a person, with the joints that only some sessions show",
     "body/parts.py": "what a Body is made of, and lumps of mass as ten parameters about a joint",
