@@ -336,7 +336,7 @@ def test_the_checks_see_what_is_wrong(tiny: dict[str, ast.Module]) -> None:
 
 
 NAMED_ELSEWHERE = {
-    "biodance.lab.corrections": "the six faults whose formulas corrections and tolerances need below `effects`",
+    "biodance.lab.plates.faults": "the six faults whose formulas corrections and tolerances need below `effects`",
     "biodance.lab.plates.read": "the reader's two defects, named as the causes that tell them (`Defect.effect`)",
     "biodance.body.human.human": "joint_centre, a row of the table of error sizes",
     "biodance.body.human.static_centres": "joint_centre, a row of the table of error sizes",

@@ -230,6 +230,12 @@ class Standing:
         return reach is None or shoulder == label or bool(reach[0] <= away <= reach[1])
 
 
+def _from_left_to_right(known: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the vectors (3,) m from the left to the right landmark of each pair of which both are known."""
+    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
+    return {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+
+
 def _stature(known: Mapping[str, Array], floor: float) -> float:
     """Return the stature, m, that the usual heights of landmarks above the ankle tell (median); 0 without one."""
     usual = [(place[2], _height_of(name)) for name, place in known.items()]
@@ -244,8 +250,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     ``at`` label -> (3,) m, z up; ``named`` landmark -> label.
     """
     known = {place: at[label] for place, label in named.items()}
-    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
-    pairs = {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+    pairs = _from_left_to_right(known)
     ends = [(f"{side}_{front}", back.format(side)) for side in SIDES for front, back in _FRONT_AND_BACK]
     ahead = [known[front] - known[back] for front, back in ends if known.keys() >= {front, back}]
     if len(pairs) < 3 or not ahead:
