@@ -4,7 +4,6 @@ acts on the person beside gravity and the plates: rails, ropes, table edges, and
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
 from typing import Any, Literal
 
 import numpy as np
@@ -13,13 +12,12 @@ from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Subject
-from biodance.virtual_lab import recording_faults as made
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.movement.protocol import Protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, stream
-from biodance.virtual_lab.recording_faults import Builder, Clock, axis_index
+from biodance.virtual_lab.recording_faults import FAULTS, Clock, axis_index, with_target
 from biodance.virtual_lab.truth import CARRIERS, MERGED, load_on
 from biodance.virtual_lab.visit import FIRST_VISIT, Fault, LabVisit
 
@@ -67,14 +65,14 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     return out
 
 
+FORCES: dict[str, Callable[..., AppliedForce]] = {}
+"""Everything that pulls or pushes below, by its name."""
+
+
 def acting(act: Callable[..., Array]) -> Callable[..., AppliedForce]:
     """Build forces from ``act`` (performance, time (T,) s, target, **sizes) -> wrench (T, 6) about the lab origin."""
-
-    @wraps(act)
-    def build(target: str, **sizes: float) -> AppliedForce:
-        return lambda performance, time: act(performance, time, target, **sizes)
-
-    return build
+    FORCES[act.__name__] = with_target(act)
+    return FORCES[act.__name__]
 
 
 @acting
@@ -250,23 +248,6 @@ def clock_of(protocol: Protocol) -> Clock:
     }
 
 
-FAULTS: dict[str, Builder] = {
-    f.__name__: f
-    for f in (
-        *(made.plate_offset, made.plate_gain, made.plate_crosstalk, made.plate_drift, made.plate_position),
-        *(made.plate_rotation, made.plate_hysteresis, made.plate_creep, made.plate_bending, made.object_on_plate),
-        *(made.axis_error, made.clipping, made.mains_hum, made.loose_connection, made.saturating),
-        *(made.time_delay, made.clock_drift, made.trigger_jitter, made.frame_rate, made.filter_mismatch),
-        *(made.body_mass, made.unit_error, made.labels_swapped, made.dropped_frames, made.swaying_cameras),
-    )
-}
-FORCES: dict[str, Callable[..., AppliedForce]] = {
-    f.__name__: f
-    for f in (
-        *(external_contact, body_weight_support, slack_harness),
-        *(table_edge, spinning_wheel),
-    )
-}
 _GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "time", "return")
 """What a builder, or the function behind it, takes beside the sizes of a cause."""
 

@@ -6,7 +6,8 @@ from and to where in the session (0 to 1) every trial lies.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial, wraps
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,41 @@ def decoding(plate: PlateRecording) -> Array:
     return np.kron(np.eye(2), turn) @ to_surface @ loads
 
 
+FAULTS: dict[str, Builder] = {}
+"""Every fault made here, by its name."""
+
+
+def made_here(build: Builder) -> Builder:
+    """Add a fault to those that are known by name."""
+    FAULTS[build.__name__] = build
+    return build
+
+
+def with_target(act: Callable[..., Any]) -> Callable[..., Any]:
+    """Return of ``act`` (what it acts on, target, **sizes) the function of target and sizes that returns the rest."""
+
+    @wraps(act)
+    def build(target: str, **sizes: float) -> Callable[..., Any]:
+        return partial(act, target=target, **sizes)
+
+    return build
+
+
+def on_recording(change: Callable[..., Recording]) -> Builder:
+    """Build faults of a whole recording from ``change`` (recording, target, **sizes) -> Recording."""
+    return made_here(with_target(change))
+
+
+def on_plate(change: Callable[..., Array]) -> Builder:
+    """Build faults of one plate from ``change`` (wrench (S, 6), target, **sizes) -> (S, 6)."""
+
+    @wraps(change)
+    def build(target: str, **sizes: float) -> Fault:
+        return _in_wrench(target, lambda wrench, _: change(wrench, target, **sizes))
+
+    return made_here(build)
+
+
 def on_channel(change: Callable[..., Array]) -> Builder:
     """Build faults of one channel of one plate from ``change`` (Channel, **sizes) -> (S,)."""
 
@@ -61,27 +97,7 @@ def on_channel(change: Callable[..., Array]) -> Builder:
 
         return _in_wrench(target, changed)
 
-    return build
-
-
-def on_plate(change: Callable[..., Array]) -> Builder:
-    """Build faults of one plate from ``change`` (wrench (S, 6), target, **sizes) -> (S, 6)."""
-
-    @wraps(change)
-    def build(target: str, **sizes: float) -> Fault:
-        return _in_wrench(target, lambda wrench, _: change(wrench, target, **sizes))
-
-    return build
-
-
-def on_recording(change: Callable[..., Recording]) -> Builder:
-    """Build faults of a whole recording from ``change`` (recording, target, **sizes) -> Recording."""
-
-    @wraps(change)
-    def build(target: str, **sizes: float) -> Fault:
-        return lambda recording: change(recording, target, **sizes)
-
-    return build
+    return made_here(build)
 
 
 def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Fault:
@@ -329,6 +345,7 @@ def labels_swapped(recording: Recording, target: str) -> Recording:
     return replace(recording, markers=Markers(names, markers.time, markers.xyz))
 
 
+@made_here
 def frame_rate(target: str, ratio: float) -> Fault:
     """Declare the rates (cameras and force alike) ``ratio`` times what they were."""
     if not 0.1 < ratio < 10:
