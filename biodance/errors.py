@@ -5,7 +5,7 @@ known) is a status in its result, not an exception.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 
 class BiodanceError(ValueError):
@@ -111,10 +111,15 @@ class UnknownName(BiodanceError):
         return cls(f"{name!r} is not {article} {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
 
 
+def refuse_unknown(kind: str, name: str, legal: Collection[str]) -> None:
+    """Raise UnknownName where a ``name`` of some ``kind`` is none of the ``legal`` ones."""
+    if name not in legal:
+        raise UnknownName.of(kind, name, tuple(legal))
+
+
 def known_index(kind: str, name: str, legal: list[str] | tuple[str, ...]) -> int:
     """Return where a ``name`` of some ``kind`` stands among the ``legal`` ones; UnknownName where it is none."""
-    if name not in legal:
-        raise UnknownName.of(kind, name, legal)
+    refuse_unknown(kind, name, legal)
     return legal.index(name)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 
 from biodance.dance.problem.person import GRADES, PLAIN_MOVEMENTS, limits_in, plain
-from biodance.errors import UnknownName
+from biodance.errors import refuse_unknown
 from biodance.library import folder, names, read_toml
 from biodance.records import SIDES
 
@@ -69,8 +69,7 @@ def limits_text(template: str, values: Mapping[str, Any]) -> str:
         A value is not legal; the message says which, and what would be.
     """
     legal = (_NOBODY, *names(_TEMPLATES))
-    if template not in legal:
-        raise UnknownName.of("template of limits", template, legal)
+    refuse_unknown("template of limits", template, legal)
     wanted = {key: _joined(value) if key in _SIDED else value for key, value in values.items()}
     wanted = {key: value for key, value in wanted.items() if value not in ("", [], {}, None)}
     limits_in(wanted, _FILE)

@@ -16,7 +16,7 @@ from biodance.app.sessions import SessionPlace
 from biodance.batch.summary import folder_name
 from biodance.batch.work import TABLES
 from biodance.child_process import run_python
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
 from biodance.report.files import for_spreadsheets
@@ -160,8 +160,7 @@ def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
     BiodanceError
         It cannot be written; the sentence is that of ``biodance export``.
     """
-    if kind not in EXPORTS:
-        raise UnknownName.of("format", kind, tuple(EXPORTS))
+    refuse_unknown("format", kind, EXPORTS)
     stem = folder_name(f"{place.name}_{trial}" if trial else place.name).replace(" ", "_")
     with tempfile.TemporaryDirectory(prefix="biodance-") as folder:
         out = Path(folder) / (f"{stem}.{EXPORTS[kind]}" if EXPORTS[kind] else f"{stem}_{kind}")

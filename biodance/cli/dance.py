@@ -28,7 +28,7 @@ from biodance.cli.app import (
     show_place,
     whole,
 )
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, refuse_unknown
 
 if TYPE_CHECKING:
     from biodance.dance.problem.plan import Plan
@@ -148,8 +148,7 @@ def limits_command(
     from biodance.report.files import refuse_file
 
     legal = names("protocols/limits")
-    if template not in legal:
-        raise UnknownName.of("template of limits", template, legal)
+    refuse_unknown("template of limits", template, legal)
     refuse_file(out, force=force)
     write_whole(out, (folder("protocols") / "limits" / f"{template}.toml").read_bytes(), over=force)
     show_place(out)

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from biodance.errors import BiodanceError, FileRefused, SessionRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, SessionRefused, refuse_unknown
 from biodance.lab.plain_text import read_bytes
 from biodance.lab.readers import read_head, read_trial, sniffed
 from biodance.lab.readers.table import read_cells
@@ -201,8 +201,7 @@ def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRe
     rename: dict[str, str] = said["joints"].get("rename", {})
     fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
     for name in (*fixed, *rename.values()):
-        if name not in joints:
-            raise UnknownName.of("joint of the robot", name, joints)
+        refuse_unknown("joint of the robot", name, joints)
     pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
     trials = tuple(
         _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
@@ -250,8 +249,7 @@ def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[P
                 f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role."
             )
         role = entry.get("role", _role(name))
-        if role not in ROLES:
-            raise UnknownName.of("trial role", role, ROLES)
+        refuse_unknown("trial role", role, ROLES)
         if role != "skip":
             found[name] = (cast(Role, role), (folder / entry["encoders"], folder / entry["plate"]))
     return found

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from biodance.body.parts import GRAVITY
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Subject
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
@@ -50,8 +50,7 @@ def true_poses(performance: Performance, time: Array) -> Poses:
 
 def grip(target: str, pose: Poses) -> Array:
     """Return where something touches the part ``target`` of the body (T, 3) m; UnknownName lists the parts."""
-    if target not in GRIPS:
-        raise UnknownName.of("part of the virtual body that something can touch", target, tuple(GRIPS))
+    refuse_unknown("part of the virtual body that something can touch", target, GRIPS)
     segment, place = GRIPS[target]
     return pose.points([TRUE_SEGMENTS.index(segment)], np.array([place]))[:, 0]
 
@@ -194,8 +193,7 @@ def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> 
 
 
 def _carrier(target: str) -> str:
-    if target not in MERGED:
-        raise UnknownName.of("segment of the 12-segment model", target, tuple(MERGED))
+    refuse_unknown("segment of the 12-segment model", target, MERGED)
     return CARRIERS.get(target, target)
 
 
@@ -263,8 +261,7 @@ def fault_of(cause: Hidden, clock: Clock) -> Fault:
     BiodanceError
         A parameter is missing or has a wrong name.
     """
-    if cause.name not in FAULTS:
-        raise UnknownName.of("effect that is made in a recording", cause.name, tuple(FAULTS))
+    refuse_unknown("effect that is made in a recording", cause.name, FAULTS)
     builder = FAULTS[cause.name]
     timed = {"clock": clock} if "clock" in builder.__annotations__ else {}
     return builder(cause.target, **cause.numbers(_parameters(builder)), **timed)
@@ -318,8 +315,7 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
         for side in SIDES
         for upper, joint in (("thigh", "knee"), ("shank", "ankle"))
     }
-    if cause.target not in ends:
-        raise UnknownName.of("segment whose length can be wrong", cause.target, tuple(ends))
+    refuse_unknown("segment whose length can be wrong", cause.target, ends)
     shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
     return replace(
         scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})

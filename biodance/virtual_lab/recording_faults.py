@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, known_index, refuse_unknown
 from biodance.lab.c3d.write import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
 from biodance.virtual_lab.instruments import HALF_SIZE
@@ -115,9 +115,7 @@ def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Faul
 def _plate_index(target: str, recording: Recording) -> int:
     name = target.partition(":")[0] if target.startswith("plate") else "plate1"
     legal = [f"plate{i + 1}" for i in range(len(recording.plates))]
-    if name not in legal:
-        raise UnknownName.of("force plate of the virtual laboratory", name, legal)
-    return legal.index(name)
+    return known_index("force plate of the virtual laboratory", name, legal)
 
 
 def _with_plate(target: str, recording: Recording, plate: PlateRecording) -> Recording:
@@ -128,15 +126,12 @@ def _with_plate(target: str, recording: Recording, plate: PlateRecording) -> Rec
 def fault_channel(target: str) -> int:
     """Return the place 0..5 of the channel that a target names last; UnknownName lists the channels."""
     name = target.rpartition(":")[2]
-    if name not in CHANNELS:
-        raise UnknownName.of("channel of a force plate", name, CHANNELS)
-    return CHANNELS.index(name)
+    return known_index("channel of a force plate", name, CHANNELS)
 
 
 def axis_index(target: str) -> int:
     """Return 0, 1, 2 for a target that ends with x, y, z; UnknownName otherwise."""
-    if target[-1:] not in ("x", "y", "z"):
-        raise UnknownName.of("axis", target[-1:], ("x", "y", "z"))
+    refuse_unknown("axis", target[-1:], ("x", "y", "z"))
     return "xyz".index(target[-1])
 
 

@@ -16,7 +16,7 @@ from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
 from biodance.dance.problem.plan import LEAST_REST, Plan
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
 from biodance.dance.problem.told import finite_number, sentences, table
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES
 
@@ -358,8 +358,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
     messages call it.
     """
     for key in raw:
-        if key not in _KEYS:
-            raise UnknownName.of(f"key of {path}", key, _KEYS)
+        refuse_unknown(f"key of {path}", key, _KEYS)
     cannot = _listed(path, raw, "cannot", "movement", _CANNOT)
     barred = [side for side in SIDES if f"stand on {side} leg" in cannot]
     legs = [leg for leg in _listed(path, raw, "stand_alone_on", "leg", SIDES, usual=SIDES) if leg not in barred]
@@ -373,8 +372,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
         ranges += [("shoulder_flexion", -math.inf, _RIGHT_ANGLE), ("shoulder_adduction", -_RIGHT_ANGLE, math.inf)]
     shares, strengths, bearing = (_shares(path, raw, name) for name in ("range_share", "strength", "weight_bearing"))
     for side, _ in bearing:
-        if side not in SIDES:
-            raise UnknownName.of(f"leg in weight_bearing of {path}", side, SIDES)
+        refuse_unknown(f"leg in weight_bearing of {path}", side, SIDES)
     return PersonLimits(
         tuple(ranges),
         shares,
@@ -400,8 +398,7 @@ def _listed(
     if not isinstance(found, list):
         raise BiodanceError(f"{path}: {key} = {found!r}; expected a list of {', '.join(legal)}, as {[legal[0]]}.")
     for one in found:
-        if one not in legal:
-            raise UnknownName.of(f"{what} in {key} of {path}", str(one), legal)
+        refuse_unknown(f"{what} in {key} of {path}", str(one), legal)
     return found
 
 

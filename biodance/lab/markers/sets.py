@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from biodance.discovery import DataFamily
-from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, TrialRefused, known_index, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES, Array, Markers, Trial
 
@@ -106,9 +106,7 @@ class MarkerSet:
 
     def marker(self, label: str) -> _SetMarker:
         """Return one marker by its label; UnknownName lists the legal ones."""
-        if label not in self.labels:
-            raise UnknownName.of(f"marker of the set {self.name}", label, self.labels)
-        return self.markers[self.labels.index(label)]
+        return self.markers[known_index(f"marker of the set {self.name}", label, self.labels)]
 
     def match(self, labels: Iterable[str]) -> dict[str, str]:
         """Return ``{label of the set: label in the file}`` for every marker of the set that the file has.
@@ -440,8 +438,7 @@ def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None
     UnknownName
         ``name`` is no landmark that biodance knows.
     """
-    if name not in LANDMARKS:
-        raise UnknownName.of("landmark", name, LANDMARKS)
+    refuse_unknown("landmark", name, LANDMARKS)
     match = marker_set.match(markers.names)
     for alternative in marker_set.landmarks.get(name, ()):
         if all(label in match for label in alternative):
