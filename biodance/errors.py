@@ -5,6 +5,7 @@ known) is a status in its result, not an exception.
 """
 
 import re
+from collections.abc import Collection, Sequence
 
 
 class BiodanceError(ValueError):
@@ -62,6 +63,14 @@ class NotSolved(BiodanceError):
     """Parameters were asked of an estimate that failed and has none: its cause and cure. Look at ``status`` before."""
 
 
+def did_you_mean(name: str, legal: Sequence[str], *, cutoff: float = 0.6) -> str:
+    """Return " Did you mean 'X'?" with the ``legal`` name that is nearest; "" where none is as near as ``cutoff``."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, legal, n=1, cutoff=cutoff)
+    return f" Did you mean {close[0]!r}?" if close else ""
+
+
 class UnknownName(BiodanceError):
     """A name that is not in the library or record it was looked up in; lists the legal names.
 
@@ -97,18 +106,20 @@ class UnknownName(BiodanceError):
         >>> print(biodance.UnknownName.of("segment", "thihg", ("thigh", "shank")))
         'thihg' is not a segment. Did you mean 'thigh'? Legal: shank, thigh.
         """
-        from difflib import get_close_matches
-
-        close = get_close_matches(name, legal, n=1)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
+        hint = did_you_mean(name, legal)
         article = "an" if kind[0] in "aeio" else "a"
         return cls(f"{name!r} is not {article} {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
 
 
+def refuse_unknown(kind: str, name: str, legal: Collection[str]) -> None:
+    """Raise UnknownName where a ``name`` of some ``kind`` is none of the ``legal`` ones."""
+    if name not in legal:
+        raise UnknownName.of(kind, name, tuple(legal))
+
+
 def known_index(kind: str, name: str, legal: list[str] | tuple[str, ...]) -> int:
     """Return where a ``name`` of some ``kind`` stands among the ``legal`` ones; UnknownName where it is none."""
-    if name not in legal:
-        raise UnknownName.of(kind, name, legal)
+    refuse_unknown(kind, name, legal)
     return legal.index(name)
 
 

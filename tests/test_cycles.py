@@ -23,7 +23,7 @@ from biodance.cycles.curves import (
 from biodance.cycles.cut import Cycle, agreement_of_events, gait_cycles, joined_events, kinematic_events, repetitions
 from biodance.cycles.movement import trial_movement
 from biodance.cycles.strides import mean_values, strides, vertical_stiffness
-from biodance.lab.c3d.subject import FileEvent, FileOutputs
+from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
@@ -285,7 +285,9 @@ def test_another_program_s_angles_and_events_stand_beside_ours():
     theirs = np.zeros((time.size, 3))
     theirs[:, 0] = np.degrees(0.5 + 0.4 * np.sin(3 * time)) - 2.0
     theirs[:10] = np.nan
-    outputs = FileOutputs({"LKneeAngles": theirs}, (FileEvent(1.0, "left", True), FileEvent(1.9, "left", True)))
+    outputs = FileOutputs(
+        {"LKneeAngles": theirs}, (FootEvent(1.0, "left", True, "file"), FootEvent(1.9, "left", True, "file"))
+    )
     (one,) = compare_angles(BODY, moved, outputs)
     assert (one.joint, one.label, one.frames) == ("left_knee_flexion", "LKneeAngles x", 190)
     assert one.offset == pytest.approx(2.0)

@@ -142,7 +142,7 @@ def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(resul
     ],
 )
 def test_a_difference_of_the_knees_is_told_where_it_is_sure(right, left, count, said):
-    assert said in " ".join(plain_movement(walked_knees(right, left, count), read_language()).said)
+    assert said in " ".join(plain_movement(walked_knees(right, left, count), read_language())["said"])
 
 
 def test_a_session_without_identification_says_so(result):

@@ -8,8 +8,8 @@ from typing import Any
 
 import tomlkit
 
-from biodance.dance.problem.person import GRADES, limits_in, plain
-from biodance.errors import UnknownName
+from biodance.dance.problem.person import GRADES, PLAIN_MOVEMENTS, limits_in, plain
+from biodance.errors import refuse_unknown
 from biodance.library import folder, names, read_toml
 from biodance.records import SIDES
 
@@ -18,30 +18,6 @@ _NOBODY = "nobody"
 """Where the form begins with nothing filled in."""
 _FILE = Path("the form")
 """By what messages call what was filled in."""
-_MOVEMENTS = {
-    "arm_lift": ("Lift the arm, in every direction", "shoulder elevation"),
-    "arm_forward": ("Lift the arm forward", "shoulder flexion"),
-    "arm_sideways": ("Lift the arm sideways", "shoulder abduction"),
-    "arm_backward": ("Move the arm backward", "shoulder extension"),
-    "arm_turn_in": ("Turn the upper arm in", "shoulder internal rotation"),
-    "arm_turn_out": ("Turn the upper arm out", "shoulder external rotation"),
-    "elbow_bend": ("Bend the elbow", "elbow flexion"),
-    "hip_bend": ("Bend the hip", "hip flexion"),
-    "leg_backward": ("Move the leg backward", "hip extension"),
-    "leg_sideways": ("Move the leg sideways", "hip abduction"),
-    "leg_across": ("Move the leg across the middle", "hip adduction"),
-    "leg_turn_in": ("Turn the leg in", "hip internal rotation"),
-    "leg_turn_out": ("Turn the leg out", "hip external rotation"),
-    "knee_bend": ("Bend the knee", "knee flexion"),
-    "foot_up": ("Pull the foot up", "ankle dorsiflexion"),
-    "foot_down": ("Push the foot down", "ankle plantarflexion"),
-    "foot_turn_in": ("Turn the sole in", "ankle inversion"),
-    "foot_turn_out": ("Turn the sole out", "ankle eversion"),
-    "trunk_bow": ("Bow the trunk", "trunk flexion"),
-    "trunk_lean": ("Lean the trunk to a side", "trunk bending"),
-    "trunk_turn": ("Turn the trunk", "trunk rotation"),
-}
-"""Movement in the file: what the form and the ISB call it."""
 _CANNOT = {
     "stand": "Stand",
     "stand on right leg": "Stand on the right leg alone",
@@ -71,7 +47,8 @@ def limits_form() -> dict[str, Any]:
         "templates": {_NOBODY: {}, **{name: _by_side(read_toml(_path(name))) for name in names(_TEMPLATES)}},
         "movements": [
             {"key": key, "words": words, "isb": isb, "sided": not key.startswith("trunk")}
-            for key, (words, isb) in _MOVEMENTS.items()
+            for key, (words, isb, _) in PLAIN_MOVEMENTS.items()
+            if words
         ],
         "strengths": [{"key": key, "words": said, "sided": key != "trunk"} for key, said in _STRENGTHS.items()],
         "cannot": _CANNOT,
@@ -92,8 +69,7 @@ def limits_text(template: str, values: Mapping[str, Any]) -> str:
         A value is not legal; the message says which, and what would be.
     """
     legal = (_NOBODY, *names(_TEMPLATES))
-    if template not in legal:
-        raise UnknownName.of("template of limits", template, legal)
+    refuse_unknown("template of limits", template, legal)
     wanted = {key: _joined(value) if key in _SIDED else value for key, value in values.items()}
     wanted = {key: value for key, value in wanted.items() if value not in ("", [], {}, None)}
     limits_in(wanted, _FILE)

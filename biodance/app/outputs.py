@@ -10,14 +10,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from biodance.app.sessions import SessionPlace
 from biodance.batch.summary import folder_name
 from biodance.batch.work import TABLES
 from biodance.child_process import run_python
-from biodance.errors import BiodanceError, UnknownName
-from biodance.lab.plain_text import for_spreadsheet
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
+from biodance.report.files import for_spreadsheets
 
 _LONGEST = 600.0
 """s that a program started for one download may take."""
@@ -121,41 +123,27 @@ def _tables(place: SessionPlace) -> list[Path]:
 
 def workbook(place: SessionPlace) -> bytes:
     """Return the tables of the results as .xlsx, one sheet each; those by frame are left to CSV and Parquet."""
-    import xlsxwriter
-    from pyarrow import parquet
+    import pandas as pd
 
-    buffer = io.BytesIO()
-    with xlsxwriter.Workbook(buffer, {"in_memory": True, "nan_inf_to_errors": False}) as book:
-        bold = book.add_format({"bold": True, "bottom": 1})
-        about = book.add_worksheet("about")
-        lines = [f"Session {place.name}", f"Tables with units in their headings; all in {place.results / TABLES}."]
-        for path in _tables(place):
-            table = parquet.read_table(path)
-            if table.num_rows > _MOST_ROWS or path.stem.endswith(("residuals", "angle_states")):
-                lines.append(f"{path.stem}: {table.num_rows} rows, as CSV and Parquet alone.")
-                continue
-            lines.append(f"{path.stem}: {table.num_rows} rows.")
-            sheet = book.add_worksheet(path.stem[:31])
-            sheet.freeze_panes(1, 1)
-            for column, name in enumerate(table.column_names):
-                sheet.write_string(0, column, name, bold)
-                sheet.set_column(column, column, max(10, min(len(name) + 2, 40)))
-                for row, value in enumerate(table[name].to_pylist(), start=1):
-                    _write_cell(sheet, row, column, value)
-        for row, line in enumerate(lines):
-            about.write_string(row, 0, line)
+    buffer, tables = io.BytesIO(), {path.stem: pd.read_parquet(path) for path in _tables(place)}
+    kept = {
+        name: table
+        for name, table in tables.items()
+        if len(table) <= _MOST_ROWS and not name.endswith(("residuals", "angle_states"))
+    }
+    about = [f"Session {place.name}", f"Tables with units in their headings; all in {place.results / TABLES}."]
+    about += [
+        f"{name}: {len(table)} rows{'' if name in kept else ', as CSV and Parquet alone'}."
+        for name, table in tables.items()
+    ]
+    options = {"options": {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}}
+    with pd.ExcelWriter(buffer, engine="xlsxwriter", engine_kwargs=options) as book:
+        pd.Series(about).to_excel(book, sheet_name="about", index=False, header=False)
+        for name, table in kept.items():
+            known = for_spreadsheets(table.replace([np.inf, -np.inf], np.nan))
+            known.to_excel(book, sheet_name=name[:31], index=False, freeze_panes=(1, 1))
+            book.sheets[name[:31]].autofit(max_width=300)
     return buffer.getvalue()
-
-
-def _write_cell(sheet: Any, row: int, column: int, value: Any) -> None:
-    """Write one value; what is not known stays empty, and no text becomes a formula."""
-    if isinstance(value, bool):
-        sheet.write_boolean(row, column, value)
-    elif isinstance(value, int | float):
-        if value == value and abs(value) != float("inf"):
-            sheet.write_number(row, column, value)
-    elif value is not None:
-        sheet.write_string(row, column, str(for_spreadsheet(str(value)))[:32000])
 
 
 def csv_archive(place: SessionPlace) -> bytes:
@@ -172,8 +160,7 @@ def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
     BiodanceError
         It cannot be written; the sentence is that of ``biodance export``.
     """
-    if kind not in EXPORTS:
-        raise UnknownName.of("format", kind, tuple(EXPORTS))
+    refuse_unknown("format", kind, EXPORTS)
     stem = folder_name(f"{place.name}_{trial}" if trial else place.name).replace(" ", "_")
     with tempfile.TemporaryDirectory(prefix="biodance-") as folder:
         out = Path(folder) / (f"{stem}.{EXPORTS[kind]}" if EXPORTS[kind] else f"{stem}_{kind}")

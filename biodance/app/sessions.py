@@ -10,7 +10,7 @@ from biodance.app.edits import SessionText
 from biodance.batch.run import Ledger, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
 from biodance.batch.work import OUTCOME, TABLES, SessionTask, fingerprint_of
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, refuse_unknown
 from biodance.lab.session.archive import archive_folders, visit_date
 from biodance.library import parse_json
 
@@ -87,8 +87,7 @@ class Archive:
 
     def __getitem__(self, name: str) -> SessionPlace:
         """Return a session by its name; UnknownName where there is none, so that no other path can be asked for."""
-        if name not in self._places:
-            raise UnknownName.of("session of this folder", name, tuple(self._places))
+        refuse_unknown("session of this folder", name, self._places)
         return self._places[name]
 
     def __iter__(self) -> Iterator[SessionPlace]:

@@ -389,7 +389,8 @@ def run_batch(
     tasks = []
     for path in sessions:
         if results not in (path.resolve(), *path.resolve().parents):
-            name, fingerprint = _name(path, archive), fingerprint_of(path, chosen)
+            below = path.relative_to(archive)  # as it is called there, also where it is a link to another disk
+            name, fingerprint = readable(below if below.parts else archive.resolve().name), fingerprint_of(path, chosen)
             place = os.path.abspath(folder / SESSIONS / folder_name(name))  # workers of a cluster work elsewhere
             tasks.append(SessionTask(name, os.path.abspath(path), place, fingerprint, chosen, pages, limit))
     if not tasks:
@@ -446,12 +447,6 @@ def _work_off(
             done += 1
             tell(f"{task.name}: {outcome.status}", done, len(tasks))
     return len(open_tasks)
-
-
-def _name(session: Path, archive: Path) -> str:
-    """Return the name of a session: its folder below the archive, that of the archive where it is one session."""
-    below = session.relative_to(archive)  # as it is called there, also where it is a link to another disk
-    return readable(below if below.parts else archive.resolve().name)
 
 
 def summary_of(run: BatchRun) -> dict[str, Any]:

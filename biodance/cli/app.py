@@ -25,6 +25,7 @@ app = App(
     help="Estimate the segment inertial parameters of a person from motion capture and force plates. For research use "
     "only, not a medical device.",
     suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=""),
 )
 
 
@@ -55,54 +56,44 @@ def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool
     return None if path is None else show_place(path)
 
 
-JsonOption = Annotated[
-    bool, Parameter(name="--json", negative="", help="Print the results as one JSON document on stdout.")
-]
+JsonOption = Annotated[bool, Parameter(help="Print the results as one JSON document on stdout.")]
 ForceOption = Annotated[
     bool,
-    Parameter(name="--force", negative="", help="Write into a non-empty folder; overwrite existing files."),
+    Parameter(help="Write into a non-empty folder; overwrite existing files."),
 ]
-Tables = Annotated[
-    Path | None, Parameter(name="--tables", help="Also write the results as tables (CSV and Parquet) to this folder.")
-]
-OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Open the report in a browser when done.")]
-OutOption = Annotated[Path, Parameter(name="--out", help="Output folder; created if it does not exist.")]
+Tables = Annotated[Path | None, Parameter(help="Also write the results as tables (CSV and Parquet) to this folder.")]
+OpenOption = Annotated[bool, Parameter(name="--open", help="Open the report in a browser when done.")]
+OutOption = Annotated[Path, Parameter(help="Output folder; created if it does not exist.")]
 
 ReferenceOption = Annotated[
     Path | None,
     Parameter(
-        name="--reference",
-        help="Folder of an earlier session of the same person without added load; changes are reported relative to it.",
+        help="Folder of an earlier session of the same person without added load; changes are reported relative to it."
     ),
 ]
 BodyOption = Annotated[
     Path | None,
     Parameter(
-        name="--body",
-        help="body.json from an earlier session of the same person, used as the prior in place of the segment table.",
+        help="body.json from an earlier session of the same person, used as the prior in place of the segment table."
     ),
 ]
 LabOption = Annotated[
-    Path | None, Parameter(name="--lab", help="lab.toml of the laboratory; its accepted corrections are applied first.")
+    Path | None, Parameter(help="lab.toml of the laboratory; its accepted corrections are applied first.")
 ]
 Set = Annotated[
     tuple[str, ...],
     Parameter(
         name="--set",
-        negative=(),
         help="Override a setting, e.g. --set filter.cutoff=6; repeatable. `biodance settings` lists all of them.",
     ),
 ]
 MarkersFile = Annotated[
     str | None,
-    Parameter(name="--markers", help="Marker set: the name of a built-in set, or a TOML file (see CONTRIBUTING.md)."),
+    Parameter(help="Marker set: the name of a built-in set, or a TOML file (see CONTRIBUTING.md)."),
 ]
 SubjectOption = Annotated[
     str | None,
-    Parameter(
-        name="--subject",
-        help="Subject to read if a C3D file contains several; required for such files.",
-    ),
+    Parameter(help="Subject to read if a C3D file contains several; required for such files."),
 ]
 
 
@@ -185,8 +176,7 @@ class RobotFile:
     mend: Annotated[
         bool,
         Parameter(
-            negative="",
-            help="Replace links with physically impossible inertia by a solid box of the same mass, and report them.",
+            help="Replace links with physically impossible inertia by a solid box of the same mass, and report them."
         ),
     ] = False
 

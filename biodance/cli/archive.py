@@ -98,10 +98,10 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
 def learn_command(
     archive: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="Output file, lab.toml; an existing file is never overwritten.")],
+    out: Annotated[Path, Parameter(help="Output file, lab.toml; an existing file is never overwritten.")],
     healthy: Annotated[
         str,
-        Parameter(name="--healthy", help="Sessions of healthy people, as S01,S02,S03: normal bands, GPS and GDI."),
+        Parameter(help="Sessions of healthy people, as S01,S02,S03: normal bands, GPS and GDI."),
     ] = "",
     json: JsonOption = False,
 ) -> int:

@@ -28,18 +28,16 @@ from biodance.cli.app import (
     show_place,
     whole,
 )
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, refuse_unknown
 
 if TYPE_CHECKING:
     from biodance.dance.problem.plan import Plan
     from biodance.records import Subject
 
-FileOut = Annotated[Path, Parameter(name="--out", help="Output file, e.g. dance.html.")]
+FileOut = Annotated[Path, Parameter(help="Output file, e.g. dance.html.")]
 DespiteOption = Annotated[
     bool,
-    Parameter(
-        negative="", help="Write cards or page of a dance that is NOT SAFE when imprecise all the same; they say so."
-    ),
+    Parameter(help="Write cards or page of a dance that is NOT SAFE when imprecise all the same; they say so."),
 ]
 
 
@@ -141,7 +139,7 @@ def limits_command(
     template: Annotated[
         str, Parameter(help="Whose limits: stroke, hip_tep (a new hip), parkinson, child, old or amputee.")
     ],
-    out: Annotated[Path, Parameter(name="--out", help="Output file, e.g. person.toml.")],
+    out: Annotated[Path, Parameter(help="Output file, e.g. person.toml.")],
     force: ForceOption = False,
 ) -> int:
     """Write a commented file of one person's limits, to be changed and given to `biodance dance --limits`."""
@@ -150,8 +148,7 @@ def limits_command(
     from biodance.report.files import refuse_file
 
     legal = names("protocols/limits")
-    if template not in legal:
-        raise UnknownName.of("template of limits", template, legal)
+    refuse_unknown("template of limits", template, legal)
     refuse_file(out, force=force)
     write_whole(out, (folder("protocols") / "limits" / f"{template}.toml").read_bytes(), over=force)
     show_place(out)
@@ -192,7 +189,7 @@ def feedback_command(
 def play_command(
     dance: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="Output video: .gif, or .mp4 if ffmpeg is installed.")],
+    out: Annotated[Path, Parameter(help="Output video: .gif, or .mp4 if ffmpeg is installed.")],
     hold: Annotated[float, Parameter(help="Longest time a posture is held, s.")] = 0.5,
     friction: Annotated[float, Parameter(help="Friction coefficient of the soles on the floor.")] = 0.5,
     json: JsonOption = False,

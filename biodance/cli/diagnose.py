@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 def foresee_command(
     dance: Path,
     *,
-    out: Annotated[
-        Path | None, Parameter(name="--out", help="Also write the forecast as a page, e.g. foresee.html.")
-    ] = None,
+    out: Annotated[Path | None, Parameter(help="Also write the forecast as a page, e.g. foresee.html.")] = None,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
@@ -74,10 +72,8 @@ def diagnose_command(
     accept: Annotated[
         bool,
         Parameter(
-            name="--accept",
-            negative="",
             help="Also apply the findings that are proven to make data that were not used fit better, and write the "
-            "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed.",
+            "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed."
         ),
     ] = False,
     robot: RobotFile = NO_ROBOT,
@@ -160,7 +156,7 @@ def identify_command(
     reading: Reading = USUAL_READING,
     dance: Annotated[
         Path | None,
-        Parameter(name="--dance", help="dance.npz that the person followed; reports how well it was performed."),
+        Parameter(help="dance.npz that the person followed; reports how well it was performed."),
     ] = None,
     method: Annotated[
         Literal["posterior", "paper"],

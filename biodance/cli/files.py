@@ -35,14 +35,10 @@ def register_command(
     markers: Path,
     forces: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="Folder of the new session; created if it does not exist.")],
+    out: Annotated[Path, Parameter(help="Folder of the new session; created if it does not exist.")],
     rough: Annotated[
         bool,
-        Parameter(
-            name="--rough",
-            negative="",
-            help="Write the session even if the registration is less certain than 5 mm, 0.5 deg or 5 ms.",
-        ),
+        Parameter(help="Write the session even if the registration is less certain than 5 mm, 0.5 deg or 5 ms."),
     ] = False,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -175,7 +171,7 @@ def export_command(
         Parameter(help="Folder with one closed mesh per segment (right_thigh.stl, in m), for glb and osim."),
     ] = None,
     markers: MarkersFile = None,
-    force: Annotated[bool, Parameter(name="--force", negative="", help="Overwrite an existing file.")] = False,
+    force: Annotated[bool, Parameter(help="Overwrite an existing file.")] = False,
 ) -> int:
     """Export a session, or the results of `biodance identify`, to the format of another program.
 
@@ -208,9 +204,7 @@ def live_command(
     static: Annotated[Path | None, Parameter(help="Static trial; default: the one in the same folder as FILE.")] = None,
     real_time: Annotated[
         bool,
-        Parameter(
-            name="--real-time", negative="", help="Replay at the recorded frame rate instead of as fast as possible."
-        ),
+        Parameter(help="Replay at the recorded frame rate instead of as fast as possible."),
     ] = False,
     subject: str | None = None,
     markers: MarkersFile = None,

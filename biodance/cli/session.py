@@ -148,11 +148,7 @@ def report_command(
     reading: Reading = USUAL_READING,
     subject_page: Annotated[
         bool,
-        Parameter(
-            name="--subject-page",
-            negative="",
-            help="Also write subject.html, a plain-language page for the person measured.",
-        ),
+        Parameter(help="Also write subject.html, a plain-language page for the person measured."),
     ] = False,
     language: Annotated[
         str | None,

@@ -47,7 +47,7 @@ class Drawn:
         ),
     ] = "normal"
     effect: Annotated[
-        tuple[str, ...], Parameter(negative=(), help="Inject a fault, e.g. plate_gain:target=Fz,gain=0.04; repeatable.")
+        tuple[str, ...], Parameter(help="Inject a fault, e.g. plate_gain:target=Fz,gain=0.04; repeatable.")
     ] = ()
     lab_seed: Annotated[
         int | None,
@@ -66,8 +66,7 @@ def simulate_command(
     dance: Annotated[
         Path | None,
         Parameter(
-            name="--dance",
-            help="dance.npz of `biodance dance`, performed instead of a protocol; the person defaults to its own.",
+            help="dance.npz of `biodance dance`, performed instead of a protocol; the person defaults to its own."
         ),
     ] = None,
     person: PersonFacts = NOBODY,

@@ -13,7 +13,7 @@ def app_command(
     folder: Path | None = None,
     *,
     out: Annotated[
-        Path | None, Parameter(name="--out", help="Folder of the results; default: FOLDER-results beside the folder.")
+        Path | None, Parameter(help="Folder of the results; default: FOLDER-results beside the folder.")
     ] = None,
     port: Annotated[int, Parameter(converter=whole, help="Port of 127.0.0.1; 0 takes a free one.")] = 0,
     browser: Annotated[

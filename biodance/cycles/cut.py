@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.lab.c3d.subject import FileEvent
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
@@ -115,7 +114,7 @@ def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, 
     return np.array(strikes), np.array(leavings)
 
 
-def delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
+def delay_of_nearest(events: Iterable[FootEvent], event: FootEvent) -> float:
     """Return by how many s the nearest of ``events`` of this kind and foot comes later; infinity without."""
     kind = event.side, event.down
     return min((one.time - event.time for one in events if (one.side, one.down) == kind), key=abs, default=np.inf)

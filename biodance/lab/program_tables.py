@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, TrialRefused, known_index
 from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_whole
 from biodance.records import Array, Wrench, assign, freeze, frozen_array
 from biodance.records.arrays import rate_of
@@ -55,9 +55,7 @@ class TimeTable:
 
     def __getitem__(self, column: str) -> Array:
         """Return one column (T,) by its label; UnknownName lists the legal ones."""
-        if column not in self.columns:
-            raise UnknownName.of("column of this table", column, self.columns)
-        return self.values[:, self.columns.index(column)]
+        return self.values[:, known_index("column of this table", column, self.columns)]
 
 
 def read_mot(path: str | Path) -> TimeTable:

@@ -8,9 +8,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from biodance.errors import BiodanceError, FileRefused, SessionRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, SessionRefused, refuse_unknown
+from biodance.lab.plain_text import read_bytes
 from biodance.lab.readers import read_head, read_trial, sniffed
-from biodance.library import read_toml, refuse_special
+from biodance.lab.readers.table import read_cells
+from biodance.library import read_toml
 from biodance.records import ROLES, Array, Markers, Role, Wrench
 from biodance.records.motion import Encoders
 from biodance.spatial import wrench_about_point
@@ -25,36 +27,19 @@ _TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers a
 _BEYOND = 0.35  # rad beyond a joint's range that an encoder may show: stops give, zeros are set by hand
 
 
-def _column_names(path: Path) -> tuple[str, ...]:
-    """Return the headings of a table of columns; () for a file that is none."""
-    if path.suffix.lower() == ".parquet":
-        import pyarrow.parquet as parquet
-
-        try:
-            return tuple(parquet.read_schema(path).names)
-        except (OSError, ValueError):
-            return ()
-    with open(path, encoding="utf-8-sig", errors="replace") as stream:
-        return tuple(cell.strip().strip('"') for cell in stream.readline().strip().split(","))
-
-
-def heading(column: str) -> str:
-    """Return the heading of a column without its unit: ``left_knee (rad)`` is left_knee."""
-    return re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", column).strip()
-
-
 def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     """Return all joints of a table, whatever robot they belong to.
 
-    A unit in the heading, ``left_knee (deg)``, counts before ``unit`` ("rad", "deg" or "": rad).
+    A unit in the heading or below it, ``left_knee (deg)``, counts before ``unit`` ("rad", "deg" or "": rad).
 
     Raises
     ------
     FileRefused
-        No column is time, a number is missing or not finite, time does not increase or has a gap.
+        It is no table (`read_cells`), no column is time, a number is missing, time does not increase or has a gap.
     """
-    values, names = _table(path)
-    clock = next((i for i, name in enumerate(names) if heading(name).lower() in _TIMES), None)
+    cells = read_cells(read_bytes(path), path)
+    values, names = cells.values, cells.labels
+    clock = next((i for i, name in enumerate(names) if name.lower() in _TIMES), None)
     if clock is None:
         raise FileRefused(
             f"{path}: no column is the time; the columns are {', '.join(names[:6])} ... Name one 'time', in s."
@@ -68,13 +53,13 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         )
     time = values[:, clock]
     _check_clock(path, time)
-    factors = np.array([_factor(path, names[i], unit) for i in columns])
-    joints = tuple(heading(names[i]) for i in columns)
+    factors = np.array([_factor(path, names[i], cells.units[i] or unit) for i in columns])
+    joints = tuple(names[i] for i in columns)
     twice = sorted({name for name in joints if joints.count(name) > 1})
     if twice:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
     notes = ("Angles were converted from degrees.",) if (factors != 1).any() else ()
-    return Encoders(time, joints, values[:, columns] * factors, (*notes, *_lost(time)))
+    return Encoders(time, joints, values[:, columns] * factors, (*cells.said[1:], *notes, *_lost(time)))
 
 
 def _lost(time: Array) -> tuple[str, ...]:
@@ -88,23 +73,8 @@ def _lost(time: Array) -> tuple[str, ...]:
     return (f"Samples are missing after {first:.3f} s{places}: up to {steps.max():.3g} s without one.",)
 
 
-def _table(path: Path) -> tuple[Array, tuple[str, ...]]:
-    import pandas as pd
-
-    refuse_special(path)
-    try:
-        frame = pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path, encoding="utf-8-sig")
-        values = frame.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    except (OSError, ValueError, pd.errors.ParserError) as error:
-        why = " ".join(str(error).split())
-        said = f"{path}: cannot be read as a table ({why}). Give columns with a heading each, separated by commas."
-        raise FileRefused(said) from error
-    return values, tuple(str(name).strip() for name in frame.columns)
-
-
 def _factor(path: Path, column: str, unit: str) -> float:
-    found = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$", column)
-    word = (found[1] if found else unit).lower().rstrip(".")
+    word = unit.lower().rstrip(".")
     if word not in _UNITS:
         raise FileRefused(f"{path}: the unit of column {column} is {word!r}; legal are rad and deg.")
     return _UNITS[word]
@@ -231,8 +201,7 @@ def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRe
     rename: dict[str, str] = said["joints"].get("rename", {})
     fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
     for name in (*fixed, *rename.values()):
-        if name not in joints:
-            raise UnknownName.of("joint of the robot", name, joints)
+        refuse_unknown("joint of the robot", name, joints)
     pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
     trials = tuple(
         _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
@@ -280,8 +249,7 @@ def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[P
                 f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role."
             )
         role = entry.get("role", _role(name))
-        if role not in ROLES:
-            raise UnknownName.of("trial role", role, ROLES)
+        refuse_unknown("trial role", role, ROLES)
         if role != "skip":
             found[name] = (cast(Role, role), (folder / entry["encoders"], folder / entry["plate"]))
     return found
@@ -325,7 +293,10 @@ def _stem(path: Path) -> str:
 
 
 def _names_joints(path: Path, joints: set[str]) -> bool:
-    return bool(joints & {heading(name) for name in _column_names(path)})
+    try:
+        return bool(joints & set(read_cells(read_bytes(path), path).labels))
+    except BiodanceError:
+        return False
 
 
 def _is_recording(path: Path) -> bool:

@@ -103,13 +103,13 @@ class LeftOutSpan:
 class FootEvent:
     """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down (a
     strike), False where it leaves (an off); ``source`` "force" where a plate saw it, "markers" where the movement of
-    the feet tells it, "hand" where session.toml says it.
+    the feet tells it, "hand" where session.toml says it, "file" where a C3D file does.
     """
 
     time: float
     side: str
     down: bool
-    source: Literal["force", "markers", "hand"] = "force"
+    source: Literal["force", "markers", "hand", "file"] = "force"
 
 
 @dataclass(frozen=True, eq=False)

@@ -232,6 +232,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
 
     judged = found.judgement
     count, made, title = len(judged.findings), now(), f"The plates of {document['archive']}"
+    dates = sorted(visit.date[:10] for visit in found.judgement.visits if visit.date)
     return render(
         "plates.html.j2",
         style=Markup(template_text("page.css") + print_sheet(title, {}, f"biodance {__version__}, {moment(made)}")),
@@ -240,7 +241,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         created=made,
         answer=f"{count} finding{'s' if count != 1 else ''}" if count else "nothing wrong to be seen",
         judged=judged,
-        dates=_dates(found),
+        dates=(f", {dates[0]} to {dates[-1]}" if dates and len(dates) == len(found.judgement.visits) else ""),
         persons=[
             one | {"found": " ".join(found["text"] for found in one["findings"]) or "nothing"}
             for one in document["persons"]
@@ -252,12 +253,6 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         notes=found.notes,
         refused=found.refused,
     )
-
-
-def _dates(found: PlatesJudged) -> str:
-    """Return from when to when the visits are; "" where that is not known."""
-    dates = sorted(visit.date[:10] for visit in found.judgement.visits if visit.date)
-    return f", {dates[0]} to {dates[-1]}" if dates and len(dates) == len(found.judgement.visits) else ""
 
 
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:

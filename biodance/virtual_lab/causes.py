@@ -4,22 +4,20 @@ acts on the person beside gravity and the plates: rails, ropes, table edges, and
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
 from typing import Any, Literal
 
 import numpy as np
 
 from biodance.body.parts import GRAVITY
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Subject
-from biodance.virtual_lab import recording_faults as made
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.movement.protocol import Protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, stream
-from biodance.virtual_lab.recording_faults import Builder, Clock, axis_index
+from biodance.virtual_lab.recording_faults import FAULTS, Clock, axis_index, with_target
 from biodance.virtual_lab.truth import CARRIERS, MERGED, load_on
 from biodance.virtual_lab.visit import FIRST_VISIT, Fault, LabVisit
 
@@ -52,8 +50,7 @@ def true_poses(performance: Performance, time: Array) -> Poses:
 
 def grip(target: str, pose: Poses) -> Array:
     """Return where something touches the part ``target`` of the body (T, 3) m; UnknownName lists the parts."""
-    if target not in GRIPS:
-        raise UnknownName.of("part of the virtual body that something can touch", target, tuple(GRIPS))
+    refuse_unknown("part of the virtual body that something can touch", target, GRIPS)
     segment, place = GRIPS[target]
     return pose.points([TRUE_SEGMENTS.index(segment)], np.array([place]))[:, 0]
 
@@ -67,14 +64,14 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     return out
 
 
+FORCES: dict[str, Callable[..., AppliedForce]] = {}
+"""Everything that pulls or pushes below, by its name."""
+
+
 def acting(act: Callable[..., Array]) -> Callable[..., AppliedForce]:
     """Build forces from ``act`` (performance, time (T,) s, target, **sizes) -> wrench (T, 6) about the lab origin."""
-
-    @wraps(act)
-    def build(target: str, **sizes: float) -> AppliedForce:
-        return lambda performance, time: act(performance, time, target, **sizes)
-
-    return build
+    FORCES[act.__name__] = with_target(act)
+    return FORCES[act.__name__]
 
 
 @acting
@@ -196,8 +193,7 @@ def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> 
 
 
 def _carrier(target: str) -> str:
-    if target not in MERGED:
-        raise UnknownName.of("segment of the 12-segment model", target, tuple(MERGED))
+    refuse_unknown("segment of the 12-segment model", target, MERGED)
     return CARRIERS.get(target, target)
 
 
@@ -250,23 +246,6 @@ def clock_of(protocol: Protocol) -> Clock:
     }
 
 
-FAULTS: dict[str, Builder] = {
-    f.__name__: f
-    for f in (
-        *(made.plate_offset, made.plate_gain, made.plate_crosstalk, made.plate_drift, made.plate_position),
-        *(made.plate_rotation, made.plate_hysteresis, made.plate_creep, made.plate_bending, made.object_on_plate),
-        *(made.axis_error, made.clipping, made.mains_hum, made.loose_connection, made.saturating),
-        *(made.time_delay, made.clock_drift, made.trigger_jitter, made.frame_rate, made.filter_mismatch),
-        *(made.body_mass, made.unit_error, made.labels_swapped, made.dropped_frames, made.swaying_cameras),
-    )
-}
-FORCES: dict[str, Callable[..., AppliedForce]] = {
-    f.__name__: f
-    for f in (
-        *(external_contact, body_weight_support, slack_harness),
-        *(table_edge, spinning_wheel),
-    )
-}
 _GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "time", "return")
 """What a builder, or the function behind it, takes beside the sizes of a cause."""
 
@@ -282,8 +261,7 @@ def fault_of(cause: Hidden, clock: Clock) -> Fault:
     BiodanceError
         A parameter is missing or has a wrong name.
     """
-    if cause.name not in FAULTS:
-        raise UnknownName.of("effect that is made in a recording", cause.name, tuple(FAULTS))
+    refuse_unknown("effect that is made in a recording", cause.name, FAULTS)
     builder = FAULTS[cause.name]
     timed = {"clock": clock} if "clock" in builder.__annotations__ else {}
     return builder(cause.target, **cause.numbers(_parameters(builder)), **timed)
@@ -337,8 +315,7 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
         for side in SIDES
         for upper, joint in (("thigh", "knee"), ("shank", "ankle"))
     }
-    if cause.target not in ends:
-        raise UnknownName.of("segment whose length can be wrong", cause.target, tuple(ends))
+    refuse_unknown("segment whose length can be wrong", cause.target, ends)
     shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
     return replace(
         scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})

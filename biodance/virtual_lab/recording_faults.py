@@ -6,11 +6,12 @@ from and to where in the session (0 to 1) every trial lies.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial, wraps
+from typing import Any
 
 import numpy as np
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, known_index, refuse_unknown
 from biodance.lab.c3d.write import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
 from biodance.virtual_lab.instruments import HALF_SIZE
@@ -46,6 +47,41 @@ def decoding(plate: PlateRecording) -> Array:
     return np.kron(np.eye(2), turn) @ to_surface @ loads
 
 
+FAULTS: dict[str, Builder] = {}
+"""Every fault made here, by its name."""
+
+
+def made_here(build: Builder) -> Builder:
+    """Add a fault to those that are known by name."""
+    FAULTS[build.__name__] = build
+    return build
+
+
+def with_target(act: Callable[..., Any]) -> Callable[..., Any]:
+    """Return of ``act`` (what it acts on, target, **sizes) the function of target and sizes that returns the rest."""
+
+    @wraps(act)
+    def build(target: str, **sizes: float) -> Callable[..., Any]:
+        return partial(act, target=target, **sizes)
+
+    return build
+
+
+def on_recording(change: Callable[..., Recording]) -> Builder:
+    """Build faults of a whole recording from ``change`` (recording, target, **sizes) -> Recording."""
+    return made_here(with_target(change))
+
+
+def on_plate(change: Callable[..., Array]) -> Builder:
+    """Build faults of one plate from ``change`` (wrench (S, 6), target, **sizes) -> (S, 6)."""
+
+    @wraps(change)
+    def build(target: str, **sizes: float) -> Fault:
+        return _in_wrench(target, lambda wrench, _: change(wrench, target, **sizes))
+
+    return made_here(build)
+
+
 def on_channel(change: Callable[..., Array]) -> Builder:
     """Build faults of one channel of one plate from ``change`` (Channel, **sizes) -> (S,)."""
 
@@ -61,27 +97,7 @@ def on_channel(change: Callable[..., Array]) -> Builder:
 
         return _in_wrench(target, changed)
 
-    return build
-
-
-def on_plate(change: Callable[..., Array]) -> Builder:
-    """Build faults of one plate from ``change`` (wrench (S, 6), target, **sizes) -> (S, 6)."""
-
-    @wraps(change)
-    def build(target: str, **sizes: float) -> Fault:
-        return _in_wrench(target, lambda wrench, _: change(wrench, target, **sizes))
-
-    return build
-
-
-def on_recording(change: Callable[..., Recording]) -> Builder:
-    """Build faults of a whole recording from ``change`` (recording, target, **sizes) -> Recording."""
-
-    @wraps(change)
-    def build(target: str, **sizes: float) -> Fault:
-        return lambda recording: change(recording, target, **sizes)
-
-    return build
+    return made_here(build)
 
 
 def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Fault:
@@ -99,9 +115,7 @@ def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Faul
 def _plate_index(target: str, recording: Recording) -> int:
     name = target.partition(":")[0] if target.startswith("plate") else "plate1"
     legal = [f"plate{i + 1}" for i in range(len(recording.plates))]
-    if name not in legal:
-        raise UnknownName.of("force plate of the virtual laboratory", name, legal)
-    return legal.index(name)
+    return known_index("force plate of the virtual laboratory", name, legal)
 
 
 def _with_plate(target: str, recording: Recording, plate: PlateRecording) -> Recording:
@@ -112,15 +126,12 @@ def _with_plate(target: str, recording: Recording, plate: PlateRecording) -> Rec
 def fault_channel(target: str) -> int:
     """Return the place 0..5 of the channel that a target names last; UnknownName lists the channels."""
     name = target.rpartition(":")[2]
-    if name not in CHANNELS:
-        raise UnknownName.of("channel of a force plate", name, CHANNELS)
-    return CHANNELS.index(name)
+    return known_index("channel of a force plate", name, CHANNELS)
 
 
 def axis_index(target: str) -> int:
     """Return 0, 1, 2 for a target that ends with x, y, z; UnknownName otherwise."""
-    if target[-1:] not in ("x", "y", "z"):
-        raise UnknownName.of("axis", target[-1:], ("x", "y", "z"))
+    refuse_unknown("axis", target[-1:], ("x", "y", "z"))
     return "xyz".index(target[-1])
 
 
@@ -329,6 +340,7 @@ def labels_swapped(recording: Recording, target: str) -> Recording:
     return replace(recording, markers=Markers(names, markers.time, markers.xyz))
 
 
+@made_here
 def frame_rate(target: str, ratio: float) -> Fault:
     """Declare the rates (cameras and force alike) ``ratio`` times what they were."""
     if not 0.1 < ratio < 10:

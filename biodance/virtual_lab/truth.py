@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import UnknownName
+from biodance.errors import refuse_unknown
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Sip
 from biodance.version import __version__
@@ -84,8 +84,7 @@ def load_on(person: Person, segment: str, mass: float, *, place: Array | None = 
     UnknownName
         ``segment`` is none of the 12.
     """
-    if segment not in MERGED:
-        raise UnknownName.of("segment of the 12-segment model", segment, tuple(MERGED))
+    refuse_unknown("segment of the 12-segment model", segment, MERGED)
     if place is None:
         away = {"r": (0.0, 0.0, 0.06), "l": (0.0, 0.0, -0.06)}.get(segment[0], (-0.10, 0.0, 0.0))
         place = merged_sip(person, person.body).com[tuple(MERGED).index(segment)] + np.array(away)

@@ -26,7 +26,7 @@ from biodance.dance.problem.state import FAR as FAR
 from biodance.dance.problem.state import Margins as Margins
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, refuse_unknown
 from biodance.records import Array, assign
 
 
@@ -174,10 +174,8 @@ def limits_with(numbers: Mapping[str, Mapping[str, float]], *, where: str) -> tu
     """
     usual = {limit.name: limit for limit in family()}
     for name, given in numbers.items():
-        if name not in usual:
-            raise UnknownName.of(f"limit in {where}", name, tuple(usual))
+        refuse_unknown(f"limit in {where}", name, usual)
         legal = tuple(one.name for one in fields(usual[name]))
         for key in given:
-            if key not in legal:
-                raise UnknownName.of(f"number of limits.{name} in {where}", key, legal)
+            refuse_unknown(f"number of limits.{name} in {where}", key, legal)
     return tuple(replace(limit, **numbers.get(name, {})) for name, limit in usual.items())

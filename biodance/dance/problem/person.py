@@ -16,7 +16,7 @@ from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
 from biodance.dance.problem.plan import LEAST_REST, Plan
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
 from biodance.dance.problem.told import finite_number, sentences, table
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES
 
@@ -111,19 +111,15 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
         plan = replace(plan, seat_height=max(least, person.seat_height))
     own = replace(body, limits=limits)
     plan = plan.with_limits(_own_limits(body, own, person))
-    hanging = _hanging(plan)
+    # arms that are lifted too little to be kept away from the trunk by people who copy imprecisely hang
+    lifts = [limit for limit in plan.limits if isinstance(limit, ArmLift)]
+    reach = {side: min([one.reach(side) for one in lifts], default=180.0) for side in SIDES}
+    hanging = tuple(side for side in SIDES if reach[side] < _ASKED and side not in plan.holds)
     notes += [
         f"The {side} arm hangs and is asked for nothing: it is lifted by less than {_ASKED:g} degrees."
         for side in hanging
     ]
     return own, replace(plan, hanging=hanging), tuple(notes)
-
-
-def _hanging(plan: Plan) -> tuple[str, ...]:
-    """Return the arms that are lifted too little to be kept away from the trunk by people who copy imprecisely."""
-    lifts = [limit for limit in plan.limits if isinstance(limit, ArmLift)]
-    reach = {side: min([one.reach(side) for one in lifts], default=180.0) for side in SIDES}
-    return tuple(side for side in SIDES if reach[side] < _ASKED and side not in plan.holds)
 
 
 def _check_standing(plan: Plan, person: PersonLimits) -> None:
@@ -270,43 +266,47 @@ _SEAT = (0.3, 1.2)
 """m that a seat may be high."""
 _Ranges = list[tuple[str, float, float]]
 
-_ARM_LIFT = (("shoulder_flexion", 1), ("shoulder_adduction", -1))
-_MOVES: dict[str, tuple[tuple[str, int], ...]] = {
-    "arm_lift": _ARM_LIFT,
-    "shoulder_elevation": _ARM_LIFT,
-    "arm_forward": (("shoulder_flexion", 1),),
-    "arm_sideways": (("shoulder_adduction", -1),),
-    "shoulder_abduction": (("shoulder_adduction", -1),),
-    "arm_backward": (("shoulder_flexion", -1),),
-    "shoulder_extension": (("shoulder_flexion", -1),),
-    "arm_turn_in": (("shoulder_rotation", 1),),
-    "shoulder_internal_rotation": (("shoulder_rotation", 1),),
-    "arm_turn_out": (("shoulder_rotation", -1),),
-    "shoulder_external_rotation": (("shoulder_rotation", -1),),
-    "elbow_bend": (("elbow_flexion", 1),),
-    "hip_bend": (("hip_flexion", 1),),
-    "leg_backward": (("hip_flexion", -1),),
-    "hip_extension": (("hip_flexion", -1),),
-    "leg_sideways": (("hip_adduction", -1),),
-    "hip_abduction": (("hip_adduction", -1),),
-    "leg_across": (("hip_adduction", 1),),
-    "leg_turn_in": (("hip_rotation", 1),),
-    "hip_internal_rotation": (("hip_rotation", 1),),
-    "leg_turn_out": (("hip_rotation", -1),),
-    "hip_external_rotation": (("hip_rotation", -1),),
-    "knee_bend": (("knee_flexion", 1),),
-    "foot_up": (("ankle_dorsiflexion", 1),),
-    "foot_down": (("ankle_dorsiflexion", -1),),
-    "ankle_plantarflexion": (("ankle_dorsiflexion", -1),),
-    "foot_turn_in": (("ankle_inversion", 1),),
-    "foot_turn_out": (("ankle_inversion", -1),),
-    "ankle_eversion": (("ankle_inversion", -1),),
-    "trunk_bow": (("trunk_flexion", 1),),
-    "trunk_extension": (("trunk_flexion", -1),),
-    "trunk_lean": (("trunk_bending", 1), ("trunk_bending", -1)),
-    "trunk_turn": (("trunk_rotation", 1), ("trunk_rotation", -1)),
+PLAIN_MOVEMENTS = {
+    "arm_lift": ("Lift the arm, in every direction", "shoulder elevation", "shoulder_flexion -shoulder_adduction"),
+    "arm_forward": ("Lift the arm forward", "shoulder flexion", "shoulder_flexion"),
+    "arm_sideways": ("Lift the arm sideways", "shoulder abduction", "-shoulder_adduction"),
+    "arm_backward": ("Move the arm backward", "shoulder extension", "-shoulder_flexion"),
+    "arm_turn_in": ("Turn the upper arm in", "shoulder internal rotation", "shoulder_rotation"),
+    "arm_turn_out": ("Turn the upper arm out", "shoulder external rotation", "-shoulder_rotation"),
+    "elbow_bend": ("Bend the elbow", "elbow flexion", "elbow_flexion"),
+    "hip_bend": ("Bend the hip", "hip flexion", "hip_flexion"),
+    "leg_backward": ("Move the leg backward", "hip extension", "-hip_flexion"),
+    "leg_sideways": ("Move the leg sideways", "hip abduction", "-hip_adduction"),
+    "leg_across": ("Move the leg across the middle", "hip adduction", "hip_adduction"),
+    "leg_turn_in": ("Turn the leg in", "hip internal rotation", "hip_rotation"),
+    "leg_turn_out": ("Turn the leg out", "hip external rotation", "-hip_rotation"),
+    "knee_bend": ("Bend the knee", "knee flexion", "knee_flexion"),
+    "foot_up": ("Pull the foot up", "ankle dorsiflexion", "ankle_dorsiflexion"),
+    "foot_down": ("Push the foot down", "ankle plantarflexion", "-ankle_dorsiflexion"),
+    "foot_turn_in": ("Turn the sole in", "ankle inversion", "ankle_inversion"),
+    "foot_turn_out": ("Turn the sole out", "ankle eversion", "-ankle_inversion"),
+    "trunk_bow": ("Bow the trunk", "trunk flexion", "trunk_flexion"),
+    "trunk_extension": ("", "trunk extension", "-trunk_flexion"),
+    "trunk_lean": ("Lean the trunk to a side", "trunk bending", "trunk_bending -trunk_bending"),
+    "trunk_turn": ("Turn the trunk", "trunk rotation", "trunk_rotation -trunk_rotation"),
 }
-"""Movement: its joints without side, and the sense in which each turns (1: that of its name)."""
+"""Movement in plain English: what a form asks ("" nothing), what the ISB calls it, and its joints without side, with a
+minus where they turn against their name.
+"""
+
+
+def _all_names() -> dict[str, tuple[tuple[str, int], ...]]:
+    """Return the joints and senses of movements in plain English, and by the ISB where that is no joint's name."""
+    turned = {
+        key: tuple((joint.lstrip("-"), -1 if joint[0] == "-" else 1) for joint in joints.split())
+        for key, (_, _, joints) in PLAIN_MOVEMENTS.items()
+    }
+    joints = {joint for moves in turned.values() for joint, _ in moves}
+    isb = {key: said.replace(" ", "_") for key, (_, said, _) in PLAIN_MOVEMENTS.items()}
+    return {name: turned[key] for key in turned for name in (key, isb[key]) if name not in joints}
+
+
+_MOVES = _all_names()
 _JOINTS = tuple(dict.fromkeys(joint for moves in _MOVES.values() for joint, _ in moves))
 
 
@@ -358,8 +358,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
     messages call it.
     """
     for key in raw:
-        if key not in _KEYS:
-            raise UnknownName.of(f"key of {path}", key, _KEYS)
+        refuse_unknown(f"key of {path}", key, _KEYS)
     cannot = _listed(path, raw, "cannot", "movement", _CANNOT)
     barred = [side for side in SIDES if f"stand on {side} leg" in cannot]
     legs = [leg for leg in _listed(path, raw, "stand_alone_on", "leg", SIDES, usual=SIDES) if leg not in barred]
@@ -373,8 +372,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
         ranges += [("shoulder_flexion", -math.inf, _RIGHT_ANGLE), ("shoulder_adduction", -_RIGHT_ANGLE, math.inf)]
     shares, strengths, bearing = (_shares(path, raw, name) for name in ("range_share", "strength", "weight_bearing"))
     for side, _ in bearing:
-        if side not in SIDES:
-            raise UnknownName.of(f"leg in weight_bearing of {path}", side, SIDES)
+        refuse_unknown(f"leg in weight_bearing of {path}", side, SIDES)
     return PersonLimits(
         tuple(ranges),
         shares,
@@ -400,8 +398,7 @@ def _listed(
     if not isinstance(found, list):
         raise BiodanceError(f"{path}: {key} = {found!r}; expected a list of {', '.join(legal)}, as {[legal[0]]}.")
     for one in found:
-        if one not in legal:
-            raise UnknownName.of(f"{what} in {key} of {path}", str(one), legal)
+        refuse_unknown(f"{what} in {key} of {path}", str(one), legal)
     return found
 
 

@@ -55,7 +55,7 @@ from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.told import finite_number, sentences, table
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, refuse_unknown
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
@@ -124,15 +124,13 @@ class Plan:
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
         for name in names:
-            if name not in _STANCES:
-                raise UnknownName.of("stance", name, _STANCES)
+            refuse_unknown("stance", name, _STANCES)
         if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
             raise BiodanceError(
                 f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or "
                 f"more."
             )
-        if self.ranges not in get_args(Range):
-            raise UnknownName.of(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
+        refuse_unknown(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
         self._check()
 
     def _check(self) -> None:
@@ -189,8 +187,7 @@ class Plan:
         """Return the factor (N,) of each of the ``segments`` in eq. 12; UnknownName if a weight names none of them."""
         named = dict(self.weights)
         for name in named:
-            if name not in segments:
-                raise UnknownName.of(f"segment to weight in plan {self.name}", name, segments)
+            refuse_unknown(f"segment to weight in plan {self.name}", name, segments)
         return np.array([named.get(name, self.other_weight) for name in segments])
 
 
@@ -233,8 +230,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
         path = locate("protocols/dances", str(name_or_path))
     raw = read_toml(path)
     for key in raw:
-        if key not in _KEYS:
-            raise UnknownName.of(f"key of {path}", key, _KEYS)
+        refuse_unknown(f"key of {path}", key, _KEYS)
     words = {key: str(raw[name]) for key, name in (("ranges", "ranges"), ("whom", "for")) if name in raw}
     flags = {name: _flag(path, name, raw[name]) for name in _FLAGS if name in raw}
     free = flags.pop("free", False)

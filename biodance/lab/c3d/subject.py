@@ -15,29 +15,20 @@ from biodance.lab.c3d.emg import EmgEnvelope, emg_envelopes, muscle_of
 from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label
-from biodance.records import Array
+from biodance.records import Array, FootEvent
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
 _WORDS = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
 
 
-@dataclass(frozen=True)
-class FileEvent:
-    """An event of the file: ``time`` s from its first frame, ``side``, ``down`` True for a strike."""
-
-    time: float
-    side: str
-    down: bool
-
-
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time; ``program`` that wrote them, or ""; what
-    the muscles did (``emg``).
+    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time from the first frame; ``program`` that wrote
+    them, or ""; what the muscles did (``emg``).
     """
 
     angles: Mapping[str, Array]
-    events: tuple[FileEvent, ...]
+    events: tuple[FootEvent, ...]
     program: str = ""
     emg: tuple[EmgEnvelope, ...] = ()
 
@@ -72,7 +63,7 @@ def read_outputs(path: str | Path) -> FileOutputs:
     return FileOutputs(angles, _events(parameters, layout), " ".join(said[:1]), emg)
 
 
-def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
+def _events(parameters: Parameters, layout: Layout) -> tuple[FootEvent, ...]:
     times = np.asarray(parameters.get("EVENT", {}).get("TIMES", np.empty((2, 0))), dtype=float)
     times = times.reshape(2, -1, order="F") if times.ndim == 1 else times
     first = (layout.first_frame - 1) / layout.rate
@@ -81,7 +72,7 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
     for (minutes, seconds), context, label in words:
         side, down = _SIDES.get(context.strip().lower()), _WORDS.get(label.strip().lower())
         if side is not None and down is not None:
-            found.append(FileEvent(float(60 * minutes + seconds - first), side, down))
+            found.append(FootEvent(float(60 * minutes + seconds - first), side, down, "file"))
     return tuple(sorted(found, key=lambda one: one.time))
 
 

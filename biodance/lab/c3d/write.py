@@ -277,8 +277,10 @@ def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
 
 
 def write_trial(trial: Trial, path: Path) -> None:
-    """Write a trial as a C3D file: as `to_ezc3d` says; what it does not hold (other analog channels, events) is left
-    out.
+    """Write a trial as a C3D file: mm, N, N·mm, float32; z up; plates as TYPE 2 about the centres of their surfaces.
+
+    The force in a plate's axes is the ground's action on the subject. What a trial holds beside markers, plates and
+    measurements of the body is left out.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from biodance.discovery import DataFamily
-from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, TrialRefused, known_index, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES, Array, Markers, Trial
 
@@ -80,18 +80,63 @@ class _SetMarker:
 
 
 @dataclass(frozen=True)
-class Contents:
-    """The checked contents of a file; ``markers`` by label."""
+class MarkerSet:
+    """A marker set: ``markers``; ``aliases`` label in files -> label of the set; ``landmarks`` name -> alternatives,
+    each the labels whose mean is the landmark; ``required`` labels without which the set is not recognised; ``name``
+    finds it again with ``read_marker_set``.
+    """
 
+    name: str
     description: str
     source: str
+    markers: tuple[_SetMarker, ...]
+    aliases: Mapping[str, str]
+    landmarks: Mapping[str, tuple[tuple[str, ...], ...]]
     required: tuple[str, ...]
-    aliases: dict[str, str]
-    markers: dict[str, _SetMarker]
-    landmarks: dict[str, tuple[tuple[str, ...], ...]]
+
+    @property
+    def title(self) -> str:
+        """The name for a reader: of a guessed set without its map."""
+        return self.name.partition(" {")[0]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """All labels of the set, in file order."""
+        return tuple(marker.label for marker in self.markers)
+
+    def marker(self, label: str) -> _SetMarker:
+        """Return one marker by its label; UnknownName lists the legal ones."""
+        return self.markers[known_index(f"marker of the set {self.name}", label, self.labels)]
+
+    def match(self, labels: Iterable[str]) -> dict[str, str]:
+        """Return ``{label of the set: label in the file}`` for every marker of the set that the file has.
+
+        The exact label wins over an alias, an alias over another letter case; a difference in case only counts where
+        the file has one such label.
+        """
+        known = set(given := tuple(labels))
+        folded: dict[str, list[str]] = {}
+        for label in given:
+            folded.setdefault(label.casefold(), []).append(label)
+        found = {}
+        for label, spellings in self._spellings.items():
+            alike = [spelling for spelling in spellings if spelling in known]
+            alike = alike or [one[0] for s in spellings if len(one := folded.get(s.casefold(), [])) == 1]
+            if alike:
+                found[label] = alike[0]
+        return found
+
+    @cached_property
+    def _spellings(self) -> Mapping[str, tuple[str, ...]]:
+        """Every label with itself and its aliases, in file order."""
+        spelt = {label: [label] for label in self.labels}
+        for alias, target in self.aliases.items():
+            if target in spelt:
+                spelt[target].append(alias)
+        return {label: tuple(some) for label, some in spelt.items()}
 
 
-def _parse_marker_set(path: Path) -> Contents:
+def _parse_marker_set(path: Path) -> MarkerSet:
     """Read and check a marker-set file; a ``[map]`` is the short form of ``[markers]`` and ``[landmarks]``."""
     table = read_toml(path)
     _legal(path, "key", tuple(table), _FILE_KEYS)
@@ -100,7 +145,7 @@ def _parse_marker_set(path: Path) -> Contents:
             raise BiodanceError(f"{path}: [{name}] must be a table. Write [{name}] and one line per entry below it.")
     short = parse_map(table["map"], str(path)) if table.get("map") else None
     markers = {label: _marker(path, label, fields) for label, fields in table.get("markers", {}).items()}
-    markers |= short.markers if short else {}
+    markers |= {one.label: one for one in short.markers} if short else {}
     if not markers:
         raise BiodanceError(f"{path}: the set has no marker. Write one line per marker under [markers].")
     required = tuple(_labels(path, "required", table.get("required", []), markers))
@@ -118,13 +163,13 @@ def _parse_marker_set(path: Path) -> Contents:
         )
     landmarks = table.get("landmarks", {})
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
-    chosen = short.landmarks if short else {}
+    chosen = dict(short.landmarks) if short else {}
     chosen |= {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
     description, source = (str(table.get(key, "")) for key in ("description", "source"))
-    return Contents(description, source, required, dict(aliases), markers, chosen)
+    return MarkerSet("", description, source, tuple(markers.values()), dict(aliases), chosen, required)
 
 
-def _read_map(path: Path) -> Contents:
+def _read_map(path: Path) -> MarkerSet:
     """Read ``[markers] map`` of a session.toml; see `parse_map`."""
     table = read_toml(path).get("markers")
     given = table.get("map") if isinstance(table, dict) else None
@@ -135,8 +180,8 @@ def _read_map(path: Path) -> Contents:
     return parse_map(given, str(path))
 
 
-def parse_map(given: Mapping[str, Any], path: str) -> Contents:
-    """Return the marker set of a map of labels to landmarks or segments; ``path`` names where it stands.
+def parse_map(given: Mapping[str, Any], path: str) -> MarkerSet:
+    """Return the marker set, without a name, of a map of labels to places; ``path`` names where it stands.
 
     Raises
     ------
@@ -163,7 +208,7 @@ def parse_map(given: Mapping[str, Any], path: str) -> Contents:
         landmarks["mid_psis"] = ((*landmarks["left_psis"][0], *landmarks["right_psis"][0]),)
     pelvis = tuple(names[0][0] for place, names in landmarks.items() if segment_of(place) == "pelvis")
     required = pelvis or tuple(markers)[:1]
-    return Contents("labels of the session's own", path, required, {}, markers, landmarks)
+    return MarkerSet("", "labels of the session's own", path, tuple(markers.values()), {}, landmarks, required)
 
 
 def segment_of(landmark: str) -> str:
@@ -273,65 +318,6 @@ GUESSED = "guessed "
 """How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
 
 
-@dataclass(frozen=True)
-class MarkerSet:
-    """A marker set: ``markers``; ``aliases`` label in files -> label of the set; ``landmarks`` name -> alternatives,
-    each the labels whose mean is the landmark; ``required`` labels without which the set is not recognised; ``name``
-    finds it again with ``read_marker_set``.
-    """
-
-    name: str
-    description: str
-    source: str
-    markers: tuple[_SetMarker, ...]
-    aliases: Mapping[str, str]
-    landmarks: Mapping[str, tuple[tuple[str, ...], ...]]
-    required: tuple[str, ...]
-
-    @property
-    def title(self) -> str:
-        """The name for a reader: of a guessed set without its map."""
-        return self.name.partition(" {")[0]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """All labels of the set, in file order."""
-        return tuple(marker.label for marker in self.markers)
-
-    def marker(self, label: str) -> _SetMarker:
-        """Return one marker by its label; UnknownName lists the legal ones."""
-        if label not in self.labels:
-            raise UnknownName.of(f"marker of the set {self.name}", label, self.labels)
-        return self.markers[self.labels.index(label)]
-
-    def match(self, labels: Iterable[str]) -> dict[str, str]:
-        """Return ``{label of the set: label in the file}`` for every marker of the set that the file has.
-
-        The exact label wins over an alias, an alias over another letter case; a difference in case only counts where
-        the file has one such label.
-        """
-        known = set(given := tuple(labels))
-        folded: dict[str, list[str]] = {}
-        for label in given:
-            folded.setdefault(label.casefold(), []).append(label)
-        found = {}
-        for label, spellings in self._spellings.items():
-            alike = [spelling for spelling in spellings if spelling in known]
-            alike = alike or [one[0] for s in spellings if len(one := folded.get(s.casefold(), [])) == 1]
-            if alike:
-                found[label] = alike[0]
-        return found
-
-    @cached_property
-    def _spellings(self) -> Mapping[str, tuple[str, ...]]:
-        """Every label with itself and its aliases, in file order."""
-        spelt = {label: [label] for label in self.labels}
-        for alias, target in self.aliases.items():
-            if target in spelt:
-                spelt[target].append(alias)
-        return {label: tuple(some) for label, some in spelt.items()}
-
-
 def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     """Return a marker set: a shipped or installed one by its name, a user's own by the path of its TOML file (then the
     path is its name), or by the path of a session.toml that has a ``[markers] map``.
@@ -374,16 +360,15 @@ def _guessed(name: str) -> MarkerSet:
     return _made(name, parse_map(given, "the guess from names and posture"), usual=True)
 
 
-def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
-    """Return the set of a file's contents; ``usual``: landmarks without a place get the usual one."""
-    markers = dict(contents.markers)
-    for place, labels in contents.landmarks.items() if usual else ():
+def _made(name: str, said: MarkerSet, *, usual: bool) -> MarkerSet:
+    """Return a set as it was ``said`` under its ``name``; ``usual``: landmarks without a place get the usual one."""
+    markers = {one.label: one for one in said.markers}
+    for place, labels in said.landmarks.items() if usual else ():
         label, known = labels[0][0], usual_places().get(place)
         if known and len(labels[0]) == 1 and markers[label].offset is None:
             markers[label] = replace(known, label=label, corner_of=())
-    aliases, landmarks = MappingProxyType(contents.aliases), MappingProxyType(contents.landmarks)
-    said = (contents.description, contents.source)
-    return MarkerSet(name, *said, tuple(markers.values()), aliases, landmarks, contents.required)
+    aliases, landmarks = MappingProxyType(said.aliases), MappingProxyType(said.landmarks)
+    return replace(said, name=name, markers=tuple(markers.values()), aliases=aliases, landmarks=landmarks)
 
 
 def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None = None) -> MarkerSet | None:
@@ -453,8 +438,7 @@ def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None
     UnknownName
         ``name`` is no landmark that biodance knows.
     """
-    if name not in LANDMARKS:
-        raise UnknownName.of("landmark", name, LANDMARKS)
+    refuse_unknown("landmark", name, LANDMARKS)
     match = marker_set.match(markers.names)
     for alternative in marker_set.landmarks.get(name, ()):
         if all(label in match for label in alternative):

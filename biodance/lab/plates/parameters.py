@@ -8,12 +8,11 @@ Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from biodance.errors import TrialRefused
+from biodance.errors import TrialRefused, did_you_mean
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.plates.corners import NOTHING_TOLD, ToldPlate
 from biodance.records import Array
@@ -248,8 +247,7 @@ def _told_columns(channels: Sequence[str | int], labels: tuple[str, ...]) -> Arr
                 f"session.toml names channel {channel!r}, which is there more than once: give its number."
             )
         else:
-            close = get_close_matches(channel, named, n=1)
-            hint = f" Did you mean {close[0]!r}?" if close else ""
+            hint = did_you_mean(channel, named)
             legal = f"Legal: {', '.join(named[:24])}{' ...' * (len(named) > 24)}."
             raise TrialRefused(f"session.toml names channel {channel!r}, which the file does not have.{hint} {legal}")
     return np.array(found, dtype=float)

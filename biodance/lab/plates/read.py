@@ -162,8 +162,8 @@ def _moves(markers: Markers | None, start: float, stop: float) -> bool:
 _AS_POUNDS = 0.03  # share by which a ratio of weights may differ from newton per pound
 
 
-class _ReadPlates(NamedTuple):
-    """The plates of one file, what a person should look at, what was decided without doubt, and what was left out."""
+class PlatesRead(NamedTuple):
+    """The plates of one recording, what a person should look at, what was decided without doubt, what was left out."""
 
     plates: tuple[Plate, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -179,7 +179,7 @@ def read_plates(
     markers: Markers | None = None,
     body_mass: float | None = None,
     told: Mapping[str, ToldPlate] | None = None,
-) -> _ReadPlates:
+) -> PlatesRead:
     """Return the force plates of a C3D file, with warnings, history and defects.
 
     Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off,
@@ -198,7 +198,7 @@ def read_plates(
     refused = {**declared.refused, **decoded.refused, **beside}
     warnings = (*declared.warnings, *decoded.warnings, *(left_out_said(n, refused[n]) for n in sorted(refused)))
     if not readings:
-        return _ReadPlates((), warnings, declared.history)
+        return PlatesRead((), warnings, declared.history)
     readings, dead = without_dead(readings, markers)
     readings, padded = without_padding(raw, readings, markers)
     start = float(markers.time[0]) if markers is not None and markers.time.size else 0.0
@@ -206,7 +206,7 @@ def read_plates(
     defects = (*dead, *padded)
     followed = (f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
     history = (*declared.history, *followed, *(one.text for one in defects))
-    return _ReadPlates(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
+    return PlatesRead(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
 
 
 def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:

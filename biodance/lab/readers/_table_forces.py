@@ -17,6 +17,7 @@ from biodance.lab.markers.sets import MarkerSet, landmark
 from biodance.lab.plates.corners import NOTHING_TOLD, Told, ToldPlate, plate_axes
 from biodance.lab.plates.decode import find_baseline
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
+from biodance.lab.plates.read import PlatesRead
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
 from biodance.spatial import wrench_about_origin
@@ -43,15 +44,6 @@ class Load(NamedTuple):
 
     columns: str
     value: Array
-
-
-@dataclass(frozen=True)
-class _TablePlates:
-    """The plates of a table, what was decided, and what a person should look at."""
-
-    plates: tuple[Plate, ...] = ()
-    history: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
 
 
 def loads_of(
@@ -93,7 +85,7 @@ def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
 
 def table_plates(
     loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
-) -> _TablePlates:
+) -> PlatesRead:
     """Return the plates of a table in the lab frame, ground on subject.
 
     ``loads`` on ``time`` (T,) s, with the wrench in the axes of the file; ``turn`` (3, 3) lab_R_file; ``markers`` (m,
@@ -111,11 +103,11 @@ def table_plates(
         placed += done.plates
         history += done.history
         if done.warnings:
-            return _TablePlates(tuple(placed), tuple(history), done.warnings)
+            return PlatesRead(tuple(placed), done.warnings, tuple(history))
     plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
     idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
     warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
-    return _TablePlates(tuple(plates), tuple(history), tuple(warnings))
+    return PlatesRead(tuple(plates), tuple(warnings), tuple(history))
 
 
 def _idle(told: Told) -> Mapping[str, list[str]]:
@@ -201,7 +193,7 @@ def _pressure(value: Array) -> Array:
     return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
 
 
-def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> _TablePlates:
+def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> PlatesRead:
     """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
     turned = [np.hstack([load.value[:, :3] @ turn.T, load.value[:, 3:] @ turn.T]) for _, load in free]
     zeroed = [_zeroed(value, time) for value in turned]
@@ -209,7 +201,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     total = np.sum([value for value, _ in signed], axis=0)
     shift = None if feet is None else _shift(total, time, feet)
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
-        return _TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
+        return PlatesRead(warnings=(_lacking([n for n, _ in free], feet, shift),))
     own = float(np.linalg.norm(shift)) > _UNDER
     at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
     plates, history = [], []
@@ -225,7 +217,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
         corners = np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
         name, put = f"plate{number}", shift if own else None
         plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
-    return _TablePlates(tuple(plates), tuple(history))
+    return PlatesRead(tuple(plates), history=tuple(history))
 
 
 _ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."

@@ -2,11 +2,8 @@
 
 import math
 import re
-import tempfile
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +11,10 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
-from biodance.lab.c3d.write import write_trial
 from biodance.lab.markers.sets import MarkerSet, recognise
 from biodance.lab.markers.upright import axis_to_head, clear_axis, turn_to
 from biodance.lab.plates.corners import Told, is_rectangle
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
-
-if TYPE_CHECKING:
-    import ezc3d
 
 NAME = "C3D"
 EXTENSIONS = (".c3d",)
@@ -255,45 +248,3 @@ def _middle(markers: Markers, axis: int) -> float:
     """Return the median coordinate of the markers along an axis, by spread frames where these show any."""
     some = spread_frames(markers.xyz)[..., axis]
     return float(np.nanmedian(some if np.isfinite(some).any() else markers.xyz[..., axis]))
-
-
-def to_ezc3d(trial: Trial) -> "ezc3d.c3d":
-    """Return a trial as an ``ezc3d.c3d`` object: mm, N, N·mm, float32; z up; force plates as TYPE 2 about their surface
-    centres.
-
-    The force in a plate's axes is the ground's action on the subject, so that ezc3d's ``extract_forceplat_data`` gives
-    the reaction.
-
-    Raises
-    ------
-    BiodanceError
-        Markers and plates have rates that do not fit, or a wrench is not finite; there is nothing to write.
-    """
-    import ezc3d
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "trial.c3d"
-        write_trial(trial, path)
-        return ezc3d.c3d(str(path))
-
-
-def from_ezc3d(file: "ezc3d.c3d", *, name: str = "trial", role: Role = "fit", subject: str | None = None) -> Trial:
-    """Return the trial in an ``ezc3d.c3d`` object, read as a file that holds the same; the object stays as it is.
-
-    ``subject`` chooses the person where the labels' prefixes name several.
-
-    Raises
-    ------
-    FileRefused
-        ezc3d cannot write the object, or what it writes cannot be trusted (`read_c3d` says why).
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{name}.c3d"
-        try:
-            deepcopy(file).write(str(path))  # writing changes the lists of labels
-        except (ArithmeticError, LookupError, TypeError, ValueError, RuntimeError, OSError) as error:
-            raise FileRefused(
-                f"{name}: ezc3d cannot write this object ({error}). Give an object that it could save as a file."
-            ) from error
-        trial = read_c3d(path, role=role, subject=subject)
-    return replace(trial, source=replace(trial.source, path=Path(f"{name}.c3d"), format="ezc3d object"))

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any, Literal
@@ -14,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from biodance.errors import SessionRefused, TrialRefused, UnknownName
+from biodance.errors import SessionRefused, TrialRefused, UnknownName, did_you_mean
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.markers.sets import MARKED_SEGMENTS
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE, ToldPlate, corners_in_lab
@@ -52,8 +51,7 @@ def legal_events(given: Sequence[Mapping[str, float | str]] | None) -> tuple[Foo
 def _event(given: Mapping[str, float | str]) -> FootEvent:
     for key in given:
         if key not in _KEYS:
-            close = get_close_matches(key, _KEYS, n=1)
-            hint = f" Did you mean {close[0]!r}?" if close else ""
+            hint = did_you_mean(key, _KEYS)
             raise SessionRefused(f"events has the unknown key {key!r}.{hint} Legal: {', '.join(_KEYS)}.")
     side, kind, time = (given.get(key) for key in _KEYS)
     if side not in SIDES or kind not in _KINDS or not isinstance(time, int | float) or not isfinite(time):

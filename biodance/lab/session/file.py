@@ -48,7 +48,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date as day
 from datetime import datetime
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
@@ -57,7 +56,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from biodance.errors import BiodanceError, SessionRefused
+from biodance.errors import BiodanceError, SessionRefused, did_you_mean
 from biodance.lab.markers.sets import parse_map
 from biodance.lab.plates.corners import Told, ToldPlate
 from biodance.lab.session.entries import (
@@ -103,11 +102,9 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
         name = _ALIASES.get(short, short)
         if name not in usual_girths() or (side and name in _MIDDLE):
             legal = (*usual_girths(), *_ALIASES)
-            close = get_close_matches(said, legal, n=1)
-            hint = f" Did you mean {close[0]!r}?" if close else ""
             raise SessionRefused(
-                f"girths_cm: there is no girth {said!r}.{hint} Legal: {', '.join(legal)}; with right_ or left_ before "
-                "those of arms and legs."
+                f"girths_cm: there is no girth {said!r}.{did_you_mean(said, legal)} Legal: {', '.join(legal)}; "
+                "with right_ or left_ before those of arms and legs."
             )
         if f"{side}{name}" in found:
             raise SessionRefused(f"girths_cm: {side}{name} is given twice (also as {said!r}). Keep one of the two.")
@@ -338,8 +335,7 @@ class SessionFile:
         said = []
         for key, _ in self.trials:
             if not set(key) & set("*?[") and not any(fnmatchcase(name.lower(), key.lower()) for name in names):
-                close = get_close_matches(key, names, n=1)
-                hint = f" Did you mean {close[0]!r}?" if close else ""
+                hint = did_you_mean(key, names)
                 said.append(f"{WARNING}[trials.{key}] fits no recording of the session.{hint}")
         return said
 
@@ -463,8 +459,7 @@ def _sentence(path: Path, fault: Any) -> str:
     where = f"[{'.'.join(table)}]" if table else "the top level"
     if fault["type"] == "extra_forbidden":
         legal = list(_TABLES.get(table[0] if table else "", _Contents).model_fields)
-        close = get_close_matches(key, legal, n=1, cutoff=0.3)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
+        hint = did_you_mean(key, legal, cutoff=0.3)
         return f"{path}: {where} has the unknown key {key!r}.{hint} Legal: {', '.join(legal)}."
     wrong = f"{path}: {key} = {fault['input']!r} in {where} is not legal: {fault['msg'][0].lower()}{fault['msg'][1:]}."
     return f"{wrong} {_HELP.get(key, '')}".rstrip()

@@ -246,7 +246,9 @@ def _picture(body: Body, bodies: tuple[tuple[str, Array], ...], cop: Array, time
 
             draw.line([(left + 16, at(0, 0)[1]), (left + width - 16, at(0, 0)[1])], fill=(120, 120, 120), width=4)
             for segment, outline, _ in sorted(silhouettes(body, q, eye), key=lambda one: one[2]):
-                draw.polygon([at(u, z) for u, z in outline], fill=_ink(segment, title == bodies[0][0]), outline="white")
+                ink = _INK[side_in_name(segment)]
+                red, green, blue = (round(one + _PALE * (255 - one)) if (title == bodies[0][0]) else one for one in ink)
+                draw.polygon([at(u, z) for u, z in outline], fill=(red, green, blue), outline="white")
             if title != bodies[0][0] and np.isfinite(cop).all():
                 x, y = at(float(cop[:2] @ across), 0.0)
                 draw.ellipse([x - 8, y - 8, x + 8, y + 8], fill=(204, 0, 0))
@@ -254,10 +256,3 @@ def _picture(body: Body, bodies: tuple[tuple[str, Array], ...], cop: Array, time
             left += width
     draw.text((16, 50), f"{time:5.1f} s", fill="black", font_size=26)
     return image.reduce(_FINE)
-
-
-def _ink(segment: str, planned: bool) -> tuple[int, int, int]:
-    """Return the colour of a segment, paler for the plan."""
-    ink = _INK[side_in_name(segment)]
-    red, green, blue = (round(one + _PALE * (255 - one)) if planned else one for one in ink)
-    return red, green, blue

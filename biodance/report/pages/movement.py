@@ -5,7 +5,6 @@ All good repetitions of all trials together, one part for each kind; the window 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -44,26 +43,6 @@ _FIRST = (
 """Key values of walking that are seen at once; all others are folded."""
 
 
-@dataclass(frozen=True)
-class MovementPart:
-    """All repetitions of one kind, ready to be shown: what is drawn ("" = nothing), and rows of tables."""
-
-    title: str
-    told: str
-    upright: str
-    counted: str
-    flags: Sequence[str]
-    angles: str
-    loads: str
-    ground: str
-    emg: str
-    consistency: str
-    trials: Sequence[str]
-    values: Sequence[Row]
-    keys: Sequence[Row]
-    more_keys: Sequence[Row]
-
-
 _STRIDES = Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}")
 _KEYS = Schema(
     "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
@@ -97,7 +76,8 @@ def movement_section(moved: SessionMovement) -> str:
     )
 
 
-def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
+def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> dict[str, Any]:
+    """Return all repetitions of one kind as the page shows them: what is drawn ("" nothing), and rows of tables."""
     title = "Running" if found.runs else CYCLE_KINDS[found.kind]
     rows = {one.name: _key(one) for one in found.keys}
     first = (
@@ -114,22 +94,22 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
         for name, unit in found.units.items()
         if name in both
     ]
-    return MovementPart(
-        title,
-        _told(found, both),
-        _UPRIGHT[found.kind],
-        f"{'Steps and strides' if found.kind == 'gait' else title}: mean (standard deviation; number).",
-        _flags(found),
-        repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
-        repetitions_figure(found, LOAD_PANELS, f"{title}: moments and powers, left beside right", normal),
-        ground.removesuffix("</div></div>") + f"{pressure_figure(found)}</div></div>" if ground else "",
-        repetitions_figure(found, muscles, f"{title}: muscle activity, left beside right"),
-        consistency_figure(found),
-        found.trials,
-        values,
-        [rows[name] for name in first if name in rows],
-        [row for name, row in rows.items() if name not in first],
-    )
+    return {
+        "title": title,
+        "told": _told(found, both),
+        "upright": _UPRIGHT[found.kind],
+        "counted": f"{'Steps and strides' if found.kind == 'gait' else title}: mean (standard deviation; number).",
+        "flags": _flags(found),
+        "angles": repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
+        "loads": repetitions_figure(found, LOAD_PANELS, f"{title}: moments and powers, left beside right", normal),
+        "ground": ground.removesuffix("</div></div>") + f"{pressure_figure(found)}</div></div>" if ground else "",
+        "emg": repetitions_figure(found, muscles, f"{title}: muscle activity, left beside right"),
+        "consistency": consistency_figure(found),
+        "trials": found.trials,
+        "values": values,
+        "keys": [rows[name] for name in first if name in rows],
+        "more_keys": [row for name, row in rows.items() if name not in first],
+    }
 
 
 def _told(found: Repetitions, values: Mapping[str, Spread]) -> str:

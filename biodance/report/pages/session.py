@@ -210,11 +210,6 @@ _UNFOLDED = {"verdict", "movement", "replay", "figures", "masses"}
 _SECTION = re.compile(r'<section id="(?P<id>[^"]+)">\s*(?P<title><h2>[^\n]*</h2>)(?P<rest>.*?)</section>', re.DOTALL)
 
 
-def _folded(whole: str) -> str:
-    """Return a page with every section but those that are read first folded under its title."""
-    return _SECTION.sub(_fold, whole)
-
-
 def _fold(found: re.Match[str]) -> str:
     where, title, rest = found.group("id", "title", "rest")
     if where in _UNFOLDED:
@@ -273,4 +268,4 @@ def page(
         identification=Markup(identified),
         words=STATUS_WORDS,
     )
-    return _folded(whole)
+    return _SECTION.sub(_fold, whole)

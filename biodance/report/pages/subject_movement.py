@@ -1,7 +1,6 @@
 """How the person who was measured moved, in plain words with one picture; computes nothing."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,23 +10,14 @@ from biodance.records import SIDES
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, around, curve_line, panel
 from biodance.report.pages.language import N_, Language
 
-
-@dataclass(frozen=True)
-class PlainMovement:
-    """``title``, sentences and rows (what, left, right) for the subject; ``picture`` as SVG, "" for none."""
-
-    title: str
-    said: Sequence[str]
-    rows: Sequence[tuple[str, str, str]]
-    picture: str
-
-
 _TITLES = {"squat": N_("How you squatted"), "sit_to_stand": N_("How you stood up"), "jump": N_("How you jumped")}
 _SIDES = {"right": N_("Right"), "left": N_("Left")}
 
 
-def plain_movement(found: Repetitions, words: Language) -> PlainMovement:
-    """Return how somebody moved, by all good repetitions of one kind."""
+def plain_movement(found: Repetitions, words: Language) -> dict[str, Any]:
+    """Return how somebody moved, by all good repetitions of one kind: ``title``, sentences ``said``, ``rows`` (what,
+    left, right), ``picture`` as SVG ("" none).
+    """
     if found.kind == "gait":
         title = words.say("How you ran") if found.runs else words.say("How you walked")
         said, rows = _walk(found, words), _steps(found, words)
@@ -39,7 +29,7 @@ def plain_movement(found: Repetitions, words: Language) -> PlainMovement:
         said = [*said, _knees(knee, words)]
         left, right = (words.say("%(number)s degrees", number=words.number(x.mean)) for x in (knee.left, knee.right))
         rows = [*rows, (words.say("How far the knee bends"), left, right)]
-    return PlainMovement(title, said, rows, _picture(found, words))
+    return {"title": title, "said": said, "rows": rows, "picture": _picture(found, words)}
 
 
 def _counted(found: Repetitions, words: Language) -> list[str]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.scores import GaitScores
-from biodance.cycles.summary import Repetitions, Spread
+from biodance.cycles.summary import Spread
 from biodance.pipeline.movement import SessionMovement
 from biodance.records import SIDES
 from biodance.report.tables.schema import Row, Schema
@@ -45,20 +45,16 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
         "mass_kg": moved.mass,
         "left_out": _LEFT_OUT.rows(found.left_out),
         "foot_off_percent": {side: _SPREAD.told(found.off(side)) for side in SIDES},
-        "spatiotemporal": _spatiotemporal(found),
+        "spatiotemporal": [
+            {"quantity": name, "unit": found.units[name], "side": side, **_SPREAD.row(told)}
+            for side in ("both", *SIDES)
+            for name, told in found.spatiotemporal(side).items()
+        ],
         "curves": [_curve(one) for one in found.groups],
         "curves_beside": [_curve(one) for one in found.file_groups],
         "key_values": _KEY.rows(found.keys),
         "scores": dict(zip(("ours", "beside"), map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
     }
-
-
-def _spatiotemporal(found: Repetitions) -> list[Row]:
-    return [
-        {"quantity": name, "unit": found.units[name], "side": side, **_SPREAD.row(told)}
-        for side in ("both", *SIDES)
-        for name, told in found.spatiotemporal(side).items()
-    ]
 
 
 def _curve(one: CurveGroup) -> Row:

@@ -189,14 +189,6 @@ DIFFERENCE_ROW = Schema(
 )
 
 
-def _together(one: Identification) -> list[Row]:
-    return [
-        Schema("segments mass_kg=mass mass_sd_kg=sd").row(several)
-        | {"mass_ci95_kg": (several.mass - SIGMAS * several.sd, several.mass + SIGMAS * several.sd)}
-        for several in (known_together(one.sip) if one.status == "solved" else ())
-    ]
-
-
 _IDENTIFICATION = Schema(
     "method status cause=identification.cause failures trials=identification.trials frames=identification.frames",
     {
@@ -212,7 +204,11 @@ _IDENTIFICATION = Schema(
             "status doubts reference p_none=p_no_load announced=found",
             {"text": say_load, "segments": SUSPECT_ROW.at("suspects")},
         ).at("search"),
-        "known_together": lambda found: _together(found.identification),
+        "known_together": lambda found: [
+            Schema("segments mass_kg=mass mass_sd_kg=sd").row(several)
+            | {"mass_ci95_kg": (several.mass - SIGMAS * several.sd, several.mass + SIGMAS * several.sd)}
+            for several in (known_together(found.identification.sip) if found.identification.status == "solved" else ())
+        ],
         "joint_torques": lambda found: torques_document(found.torques),
         "impacts": Schema("segment quantity pull left knee_Nm=knee hip_Nm=hip"),
         "differences": DIFFERENCE_ROW.at("changes"),

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.library import locate, read_toml
 from biodance.records import ROLES, Array, Role
 
@@ -192,8 +192,7 @@ def _posture(path: Path, name: str, given: Any, known: dict[str, ProtocolPosture
     if not isinstance(given, dict):
         raise BiodanceError(f"{path}: posture {name!r} must be a table, found {given!r}.")
     base = given.get("based_on", "stand")
-    if base not in known:
-        raise UnknownName.of(f"posture written before {name!r} in {path}", str(base), tuple(known))
+    refuse_unknown(f"posture written before {name!r} in {path}", str(base), known)
     values, raised = dict(known[base].values), set(known[base].raised)
     for key, value in given.items():
         if key == "based_on":
@@ -220,8 +219,7 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     name, role, stance = str(given["name"]), str(given.get("role", "fit")), str(given.get("stance", "parallel"))
     if role not in ROLES:
         raise UnknownName.of(f"role of trial {name!r} in {path}", role, ROLES)
-    if stance not in _STANCES:
-        raise UnknownName.of(f"stance of trial {name!r} in {path}", stance, _STANCES)
+    refuse_unknown(f"stance of trial {name!r} in {path}", stance, _STANCES)
     lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
     if "gait" in given:
         return _gait(path, name, role, given)
@@ -236,8 +234,7 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
 
 def _gait(path: Path, name: str, role: Role, given: dict[str, Any]) -> TrialPlan:
     """Return a trial of walking or running: gait, seconds and speed m/s."""
-    if given["gait"] not in GAITS:
-        raise UnknownName.of(f"gait of trial {name!r} in {path}", str(given["gait"]), tuple(GAITS))
+    refuse_unknown(f"gait of trial {name!r} in {path}", str(given["gait"]), GAITS)
     seconds = _numbers(path, f"{name}.seconds", given.get("seconds", 10.0), 1)[0]
     speed = _numbers(path, f"{name}.speed", given.get("speed", GAITS[given["gait"]].speed), 1)[0]
     if not 2 <= seconds <= 600 or not 0.3 <= speed <= 5:
@@ -263,8 +260,7 @@ def _step(path: Path, trial: str, given: Any, postures: dict[str, ProtocolPostur
         wanted = given.get("to", given) if isinstance(given, dict) else given
         raise UnknownName.of(f"posture of trial {trial!r} in {path}", str(wanted), tuple(postures))
     for key in given:
-        if key not in STEP_KEYS:
-            raise UnknownName.of(f"key of a step of trial {trial!r} in {path}", key, STEP_KEYS)
+        refuse_unknown(f"key of a step of trial {trial!r} in {path}", key, STEP_KEYS)
     seconds = {k: _numbers(path, f"{trial}.{k}", given[k], 1)[0] for k in ("move", "hold", "period") if k in given}
     if any(value < 0.25 for key, value in seconds.items() if key != "hold") or seconds.get("hold", 0.0) < 0:
         raise BiodanceError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.records import SIDES, Array, Sip, Subject, freeze
 from biodance.virtual_lab.person.skeleton import (
     ARM_AND_LEG,
@@ -124,8 +124,7 @@ class AddedLoad:
     radii: Array = field(default_factory=lambda: np.full(3, 0.03))
 
     def __post_init__(self) -> None:
-        if self.segment not in TRUE_SEGMENTS:
-            raise UnknownName.of("segment of the true body", self.segment, TRUE_SEGMENTS)
+        refuse_unknown("segment of the true body", self.segment, TRUE_SEGMENTS)
         if not 0 < self.mass < 30:
             raise BiodanceError(f"AddedLoad on {self.segment}: mass = {self.mass} kg; legal: above 0 and below 30 kg.")
         freeze(self, "AddedLoad", place=(3,), radii=(3,))
@@ -179,8 +178,7 @@ class Person:
         markers = self.body.markers
         position = np.array(markers.position)
         for label, shift in shifts.items():
-            if label not in markers.names:
-                raise UnknownName.of("marker of the virtual subject", label, markers.names)
+            refuse_unknown("marker of the virtual subject", label, markers.names)
             position[markers.names.index(label)] += shift
         return replace(self, body=replace(self.body, markers=replace(markers, position=position)))
 
@@ -235,8 +233,7 @@ def make_person(
 def _with_joints_moved(size: Proportions, shifts: Mapping[str, Array]) -> Proportions:
     moved = np.array(size.centre_shift)
     for joint, shift in shifts.items():
-        if joint not in MOVABLE:
-            raise UnknownName.of("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
+        refuse_unknown("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
         side, _, kind = joint.rpartition("_")
         moved[
             TRUE_SEGMENTS.index(f"{side}_{_BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])
