@@ -12,7 +12,7 @@ from biodance.body.changes import recentre_joint
 from biodance.body.human.human import human
 from biodance.body.parts import JointError, shift_matter, smallest_eigenvalues
 from biodance.diagnosis.accept import case_fit
-from biodance.effects import Case, effect
+from biodance.effects import UNLIKE, Case, effect
 from biodance.effects.head_joint import HeadJoint
 from biodance.effects.shoulder_girdle import ShoulderGirdle
 from biodance.effects.trunk_joint import TrunkJoint
@@ -184,4 +184,4 @@ def test_still_joint_adds_nothing() -> None:
 def test_the_wrench_of_what_markers_show_is_known_poorly(name: str) -> None:
     """The size shown is known to 6 to 50 %; that says nothing of the wrench, which the joint's place decides."""
     assert 0.4 <= effect(name).unlike <= 0.6
-    assert effect("plate_gain").unlike == 0.0
+    assert effect("plate_gain").unlike == UNLIKE < 0.4

@@ -208,12 +208,14 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     resembled = [one for one in large if one not in named]
     left = adequacy(posterior.unexplained, rows)
     matters_left = any(row.matters for row in left)
-    unknown, open_ = posterior.unknown >= UNKNOWN and matters_left, len(named) < len(sure)
-    p_clean = well(rows, posterior, unknown_matters=matters_left)
+    p_clean, unknown = (
+        well(rows, posterior, unknown_matters=matters_left),
+        posterior.unknown >= UNKNOWN and matters_left,
+    )
     reasons = {
         Reason.FORCES_LEFT: unknown,
-        Reason.CONTRADICTED: open_,
-        Reason.NOT_SURE: not (named or unknown or open_) and p_clean < SUGGESTED,
+        Reason.CONTRADICTED: len(named) < len(sure),
+        Reason.NOT_SURE: p_clean < SUGGESTED and not (sure or unknown),
     }
     findings = _with_look_alikes(named, best, rows)
     told = replace(

@@ -37,7 +37,7 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     FileRefused
         It is no table (`read_cells`), no column is time, a number is missing, time does not increase or has a gap.
     """
-    cells = read_cells(read_bytes(path), path)
+    cells = read_cells(read_bytes(path), path, least=2)
     values, names = cells.values, cells.labels
     clock = next((i for i, name in enumerate(names) if name.lower() in _TIMES), None)
     if clock is None:
@@ -294,7 +294,7 @@ def _stem(path: Path) -> str:
 
 def _names_joints(path: Path, joints: set[str]) -> bool:
     try:
-        return bool(joints & set(read_cells(read_bytes(path), path).labels))
+        return bool(joints & set(read_cells(read_bytes(path), path, least=2).labels))
     except BiodanceError:
         return False
 

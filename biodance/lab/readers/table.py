@@ -48,8 +48,8 @@ def is_parquet(content: bytes) -> bool:
     return content.startswith(_PARQUET)
 
 
-def read_cells(content: bytes, path: Path) -> Cells:
-    """Return the cells of a table in a file's ``content``.
+def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:
+    """Return the cells of a table of ``least`` columns or more in a file's ``content``.
 
     Raises
     ------
@@ -57,16 +57,16 @@ def read_cells(content: bytes, path: Path) -> Cells:
         No row of labels, rows of the wrong length, a cell that is no number, a Parquet file that is damaged or cannot
         be read for want of pyarrow.
     """
-    return _of_parquet(content, path) if is_parquet(content) else _of_text(decode(content, path), path)
+    return _of_parquet(content, path) if is_parquet(content) else _of_text(decode(content, path), path, least)
 
 
-def header_of(text: str) -> tuple[int, str, tuple[str, ...]] | None:
-    """Return row (from 0), separator and cells of the labels: the first row of >= 4 cells, most no numbers."""
+def header_of(text: str, *, least: int = 4) -> tuple[int, str, tuple[str, ...]] | None:
+    """Return row (from 0), separator and cells of the labels: the first row of >= ``least`` cells, most no numbers."""
     for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
         for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
             found = tuple(cell.strip() for cell in line.split(separator))
             words = sum(not _NUMBER.fullmatch(cell) for cell in found)
-            if len(found) >= 4 and 2 * words > len(found):
+            if len(found) >= least and 2 * words > len(found):
                 return row, separator, found
     return None
 
@@ -81,8 +81,8 @@ def clean_label(cell: str) -> tuple[str, str]:
     return (unit[1].strip(), unit[2]) if unit and unit[1] else (plain, "")
 
 
-def _of_text(text: str, path: Path) -> Cells:
-    header = header_of(text)
+def _of_text(text: str, path: Path, least: int) -> Cells:
+    header = header_of(text, least=least)
     if header is None:
         raise FileRefused(f"{path}: no row holds the labels of columns. Write them into the first row, as LASI_x.")
     row, separator, found = header
