@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import TOGETHER, changes
-from biodance.diagnosis.consequence import matters
+from biodance.diagnosis.consequence import Adequacy, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
@@ -207,16 +207,7 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     named = [one for one in sure if not _is_forbidden(rows, one[0].cause)]
     resembled = [one for one in large if one not in named]
     left = adequacy(posterior.unexplained, rows)
-    matters_left = any(row.matters for row in left)
-    p_clean, unknown = (
-        well(rows, posterior, unknown_matters=matters_left),
-        posterior.unknown >= UNKNOWN and matters_left,
-    )
-    reasons = {
-        Reason.FORCES_LEFT: unknown,
-        Reason.CONTRADICTED: len(named) < len(sure),
-        Reason.NOT_SURE: p_clean < SUGGESTED and not (sure or unknown),
-    }
+    p_clean, reasons = _ends(posterior, rows, left, sure=bool(sure), forbidden=len(named) < len(sure))
     findings = _with_look_alikes(named, best, rows)
     told = replace(
         bare,
@@ -231,6 +222,24 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
         p_unknown=posterior.unknown,
     )
     return Inferred(told, search, posterior, tuple(place.cause for place, _ in named))
+
+
+def _ends(
+    posterior: Posterior, rows: Rows, left: tuple[Adequacy, ...], *, sure: bool, forbidden: bool
+) -> tuple[float, dict[Reason, bool]]:
+    """Return the probability that nothing is there that matters, and which reasons hold to say no more; ``left`` what
+    is left of the forces, whether any cause is ``sure``, and one of them ``forbidden``.
+    """
+    left_matters = any(row.matters for row in left)
+    p_clean, unknown = (
+        well(rows, posterior, unknown_matters=left_matters),
+        posterior.unknown >= UNKNOWN and left_matters,
+    )
+    return p_clean, {
+        Reason.FORCES_LEFT: unknown,
+        Reason.CONTRADICTED: forbidden,
+        Reason.NOT_SURE: p_clean < SUGGESTED and not (sure or unknown),
+    }
 
 
 def _with_look_alikes(named: list[_Told], best: Hypothesis, rows: Rows) -> tuple[Finding, ...]:
