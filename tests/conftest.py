@@ -14,7 +14,6 @@ import biodance.pipeline.front  # noqa: F401
 from biodance.lab.session.read import read_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
-from biodance.records import Session
 from biodance.threads import one_thread
 
 
@@ -37,19 +36,8 @@ def data() -> Path:
 
 
 @cache
-def _read(folder: Path) -> Session:
-    return read_session(folder)
-
-
-@cache
 def _examined(folder: Path) -> SessionResult:
-    return examine(_read(folder))
-
-
-@pytest.fixture
-def recorded(data: Path) -> Callable[[str], Session]:
-    """Return what gives a real session by its name: each is read once for the tests of all files."""
-    return lambda name: _read(data / name)
+    return examine(read_session(folder))
 
 
 @pytest.fixture

@@ -128,7 +128,6 @@ def _same_markers(some: tuple[TrialResult, ...], others: tuple[TrialResult, ...]
     return True
 
 
-@one_thread()
 def examine(
     session: Session,
     *,
@@ -187,6 +186,7 @@ def examine(
     return identified(found, reference=reference, tell=tell)
 
 
+@one_thread()
 def followed(
     session: Session,
     *,
