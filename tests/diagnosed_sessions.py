@@ -37,7 +37,7 @@ def known() -> Tolerances:
     bands = len(BANDS)
     sizes = {f"plate_offset {c}": 0.3 for c in CHANNELS} | {f"plate_gain {c}": 0.002 for c in CHANNELS[:3]}
     noise = np.tile(np.diag(NOISE**2), (bands, 1, 1))
-    return Tolerances(sizes, noise, np.full((bands, 6), MOVED), 10.0)
+    return Tolerances(sizes, noise, np.full((bands, 6), MOVED))
 
 
 def motion(seed: int) -> Motion:

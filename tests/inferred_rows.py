@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.diagnosis.candidates import SCALE, Candidate
+from biodance.diagnosis.candidates import SCALE, Candidate, log_priors
 from biodance.effects import Effect, Parameter
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, TOLERATED, Rows
 from biodance.inference.scales import LOUD, Scales, prior_sd
-from biodance.inference.sets import Search, log_priors
+from biodance.inference.sets import Search
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
@@ -81,7 +81,7 @@ def rows(
     group = np.repeat(np.arange(len(GROUPS)), width)
     X = rng.normal(size=(count, group.size))
     block = np.concatenate([np.arange(plates) % blocks, np.full(markers, 6 * len(BANDS)), np.full(observations, -1)])
-    empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)), 10.0)
+    empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)))
     return DrawnRows(None, empty, None, X, rng.normal(size=count), group, block, GROUPS, columns=causes or {})
 
 

@@ -31,7 +31,7 @@ def nulls(count: int) -> list[Null]:
 
 def learned(count: int) -> Tolerances:
     flat = np.ones((BANDS, 6))
-    start = Tolerances(dict.fromkeys(KEYS, 1.0), np.tile(np.eye(6), (BANDS, 1, 1)), flat, 10.0)
+    start = Tolerances(dict.fromkeys(KEYS, 1.0), np.tile(np.eye(6), (BANDS, 1, 1)), flat)
     return learn_tolerances(nulls(count), start, rounds=8)
 
 

@@ -33,7 +33,7 @@ def drawn(size: np.ndarray, *, each: int, seed: int = 3) -> DrawnRows:
     y = np.array(found.y)
     y[:n] = size[found.block[:n]] * rng.normal(size=n)
     y += found.X @ rng.normal(size=found.X.shape[1])
-    known = Tolerances({}, np.tile(EXPECTED, (len(BANDS), 1, 1)), np.ones((len(BANDS), 6)), 10.0)
+    known = Tolerances({}, np.tile(EXPECTED, (len(BANDS), 1, 1)), np.ones((len(BANDS), 6)))
     return replace(found, y=y, tolerances=known)
 
 

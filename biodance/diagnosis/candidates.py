@@ -5,6 +5,7 @@ weighs something) is spanned by what it does at its typical size: the columns at
 other parameters make there.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -112,6 +113,13 @@ def bases_of(causes: Sequence[Candidate]) -> tuple[Array, tuple[slice, ...]]:
     return np.concatenate([one.basis for one in causes], axis=1, dtype=float), tuple(
         slice(*pair) for pair in pairwise(ends)
     )
+
+
+def log_priors(causes: Sequence[Candidate]) -> dict[tuple[str, str], float]:
+    """Return the log prior odds of every cause: of its effect, shared by its targets."""
+    targets = Counter(one.names[0] for one in causes)
+    share = {one.names: one.effect.prior / targets[one.names[0]] for one in causes}
+    return {name: float(np.log(p / (1 - p))) for name, p in share.items()}
 
 
 def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]:

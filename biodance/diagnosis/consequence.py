@@ -28,6 +28,8 @@ def matters(effect: Effect, theta: Array) -> bool:
     return float(np.linalg.norm([values[name] / floor for name, floor in floors.items()])) >= 1.0
 
 
+NAMED, SUGGESTED = 0.85, 0.5
+"""Probability from which a cause is named, and from which it is told as only resembled."""
 LIMIT = 3.0
 """Standard deviations between laboratories beyond which what is left in one band of one channel is not adequate."""
 LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3

@@ -18,6 +18,9 @@ from scipy.linalg.lapack import dpotrs, dtrtrs
 
 from biodance.records import Array
 
+_BELOW = 1.645
+"""Standard deviations below its mean that a normal variable passes with 95 %."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearPosterior:
@@ -101,12 +104,34 @@ def visible(G: Array, length: float) -> float:
     return float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0
 
 
-def smallest_detectable(G: Array, direction: Array, threshold: float) -> float:
-    """Return the multiple of ``direction`` (k,) at which the expected log Bayes factor reaches ``threshold``;
-    infinite if it never does.
+def surely_reached(G: Array, shift: Array) -> float:
+    """Return the log Bayes factor that a cause passes in 95 % of all recordings if it adds ``shift`` (k,) to the score.
+
+    With s ~ N(shift, G) and W = (1 + G)^-1 the factor has mean m and variance v, and is taken as normal:
+
+        m = 1/2 shift' W shift + 1/2 tr(W G) - 1/2 log |1 + G|,   v = shift' W G W shift + 1/2 tr(W G W G).
     """
+    growth, bend, chance, spread = _moments(G, shift)
+    return growth + chance - _BELOW * float(np.sqrt(bend + spread))
+
+
+def _moments(G: Array, shift: Array) -> tuple[float, float, float, float]:
+    """Return what the shift adds to mean and variance of `surely_reached`, and what chance does."""
     inner = np.linalg.inv(np.eye(len(G)) + G)
-    pull = G @ direction
-    growth = 0.5 * float(pull @ inner @ pull)
-    need = threshold + 0.5 * float(np.linalg.slogdet(np.eye(len(G)) + G)[1]) - 0.5 * float(np.trace(inner @ G))
-    return float(np.sqrt(max(need, 0.0) / growth)) if growth > 1e-12 else float("inf")
+    pull, share = inner @ shift, inner @ G
+    chance = 0.5 * float(np.trace(share) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
+    return 0.5 * float(shift @ pull), float(pull @ G @ pull), chance, 0.5 * float(np.trace(share @ share))
+
+
+def smallest_detectable(G: Array, direction: Array, need: float) -> float:
+    """Return the multiple a of ``direction`` (k,) from which a cause passes ``need`` in 95 % of all recordings
+    (`surely_reached` with the shift a G direction, solved for a^2); infinite if it never does.
+    """
+    growth, bend, chance, spread = _moments(G, G @ direction)
+    if growth <= 1e-12:
+        return float("inf")
+    # growth a^2 - lack = below sqrt(bend a^2 + spread), squared: the larger root
+    lack, below = need - chance, _BELOW**2
+    half = growth * lack + 0.5 * below * bend
+    root = half**2 - growth**2 * (lack**2 - below * spread)
+    return float(np.sqrt(max(half + np.sqrt(max(root, 0.0)), 0.0))) / growth

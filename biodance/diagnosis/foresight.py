@@ -102,7 +102,7 @@ def foresee(
     put = problem(body, windows, chosen=effects)
     found, causes = build_model(put, known, effects)
     seen = visibility(found, causes)
-    rows = tuple(sorted(detection_limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))
+    rows = tuple(sorted(detection_limits(seen, body), key=lambda row: row.limit / row.typical))
     return Foresight(rows, hidden(rows), pairs := _confusions(seen, rows), _changes(causes, rows, pairs))
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes
-from biodance.diagnosis.consequence import Unobservable, least
-from biodance.diagnosis.evidence import smallest_detectable
+from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes, log_priors
+from biodance.diagnosis.consequence import NAMED, Unobservable, least
+from biodance.diagnosis.evidence import smallest_detectable, surely_reached
 from biodance.diagnosis.model import Model
 from biodance.effects import unit_at
 from biodance.effects.joint_centre import JointCentre
@@ -43,15 +43,16 @@ class Visibility:
     cuts: tuple[slice, ...]
     found: Model | None = None
 
-    def seen(self, index: int, threshold: float) -> float:
-        """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass
-        ``threshold``; each of several forces or masses at once in the same size: the worst of them.
+    def seen(self, index: int) -> float:
+        """Return the size, in units of the first parameter, from which cause ``index`` alone is named in 95 % of all
+        recordings; each of several forces or masses at once in the same size: the worst of them.
         """
         one, cut = self.causes[index], self.cuts[index]
-        size = max(smallest_detectable(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+        need = float(np.log(NAMED / (1 - NAMED))) - self._prior[one.names]
+        size = max(smallest_detectable(self.G[cut, cut], way, need) for way in unit_directions(one))
         if self.found is None or one.effect.linear or any(one.silent):
             return size
-        return _really_seen(self.found, one, size, threshold)
+        return _really_seen(self.found, one, size, need)
 
     def felt(self, index: int) -> float:
         """Return the size, in units of the first parameter, from which cause ``index`` changes the wrench by what
@@ -71,6 +72,11 @@ class Visibility:
         pull = (self.G[:, cut] @ way)[self._places]
         growth = 0.5 * np.sum((pull[:, None] @ self._padded)[:, 0] * pull, axis=1)
         return self._fixed[index] - self._fixed, growth[index] - growth
+
+    @cached_property
+    def _prior(self) -> dict[tuple[str, str], float]:
+        """Log prior odds of every cause."""
+        return log_priors(self.causes)
 
     @cached_property
     def _inner(self) -> tuple[Array, ...]:
@@ -113,19 +119,16 @@ class Visibility:
         return float(size.max(initial=0.0))
 
 
-def _really_seen(found: Model, one: Candidate, size: float, threshold: float) -> float:
-    """Return the size from which a cause that is not in proportion to its size is expected to pass ``threshold``, from
-    the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
+def _really_seen(found: Model, one: Candidate, size: float, need: float) -> float:
+    """Return the size from which a cause that is not in proportion to its size surely passes ``need``, from the
+    ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
     """
     Z, first = found.white(one.basis.astype(float)), np.eye(len(one.silent))[0]
     free = found.posterior.free(Z)
     G = Z.T @ free
-    inner = np.linalg.inv(np.eye(len(G)) + G)
-    chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
     for grown in size * np.geomspace(1.0, _SEARCHED, _STEPS) if np.isfinite(size) else ():
         rows = changes(found.problem, one.effect, grown * first)
-        s = found.white(rows[:, None])[:, 0] @ free
-        if 0.5 * float(s @ inner @ s) + chance >= threshold:
+        if surely_reached(G, found.white(rows[:, None])[:, 0] @ free) >= need:
             return float(grown)
     return float("inf")
 
@@ -174,18 +177,15 @@ def placing_leaves(error: JointError) -> float:
     return float(np.clip((error.centre**2 - fixed**2) / before**2, 0.01, 1.0))
 
 
-def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
-    """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its
+def detection_limits(seen: Visibility, body: Body) -> tuple[Unobservable, ...]:
+    """Return from which size on every cause is named and told from the others, by who looks at ``body`` with its
     joints where they are; never less than what matters (`consequence.least`, `Visibility.felt`).
     """
-    targets: dict[str, int] = {}
-    for one in seen.causes:
-        targets[one.names[0]] = targets.get(one.names[0], 0) + 1
     rows = []
     after = after_calibration(seen, body)
     for i, one in enumerate(seen.causes):
         here = after if one.effect.taken_up_by_calibration else seen
-        limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
+        limit = here.seen(i)
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))
         sizes = [one.effect.reported_size(size) for size in (limit, max(limit, here.told(i)), first.typical)]

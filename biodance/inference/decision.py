@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import TOGETHER, changes
-from biodance.diagnosis.consequence import Adequacy, matters
+from biodance.diagnosis.consequence import NAMED, SUGGESTED, Adequacy, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
@@ -36,8 +36,6 @@ from biodance.observations.newton import Newton
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
 
-NAMED, SUGGESTED = 0.85, 0.5
-"""Probability from which a cause is named, and from which it is told as only resembled."""
 _COUNTED = 1e-4
 """Probability below which it is not asked whether the causes of a set are large."""
 IN_SET = 0.95

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
+from biodance.diagnosis.consequence import NAMED
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
 from biodance.diagnosis.model import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
@@ -17,7 +18,7 @@ from biodance.diagnosis.witness_evidence import CONTACTS, ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.contact import with_contacts
-from biodance.inference.decision import NAMED, Inferred, decide
+from biodance.inference.decision import Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.own_noise import own_noise
@@ -167,7 +168,7 @@ def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[
     """Return the diagnosis with the smallest sizes of all causes that the session would show."""
     kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
     first, causes = build_model(seen.problem, known, kinds, seen.causes)
-    limits = detection_limits(visibility(first, causes), seen.problem.cases[0].body, known.threshold)
+    limits = detection_limits(visibility(first, causes), seen.problem.cases[0].body)
     rows = tuple(sorted(limits, key=lambda row: row.limit / row.typical))
     return replace(bare, limits=rows, unobservable=hidden(limits), notes=(*bare.notes, *seen.problem.notes))
 

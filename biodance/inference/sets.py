@@ -7,7 +7,6 @@ cause's model leaves of it (the share `unlike` of what it adds, per band). The u
 channel: one more member of every set.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
+from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, log_priors
 from biodance.effects import Effect, NamedCause
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
@@ -176,13 +175,6 @@ def _without_each(search: Search, known: dict[frozenset[tuple[str, str]], Hypoth
                 known[names] = hypothesis(search, rest, best.fit.scales)
         if max(known.values(), key=lambda one: one.log_posterior) is best:
             return
-
-
-def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
-    """Return the log prior odds of every cause: of its effect, shared by its targets."""
-    targets = Counter(one.names[0] for one in causes)
-    share = {one.names: one.effect.prior / targets[one.names[0]] for one in causes}
-    return {name: float(np.log(p / (1 - p))) for name, p in share.items()}
 
 
 def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:

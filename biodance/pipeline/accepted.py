@@ -20,6 +20,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
+from biodance.diagnosis.consequence import NAMED
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.repairs import failed_check
@@ -30,7 +31,7 @@ from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.unloaded_body import tables_by_sides
-from biodance.inference.decision import NAMED, Inferred
+from biodance.inference.decision import Inferred
 from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
 from biodance.lab.c3d.results import write_exchanged

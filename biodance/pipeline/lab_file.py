@@ -106,12 +106,13 @@ class _Instruments(_Table):
 
 class _Tolerances(_Table):
     origin: _Words
-    threshold: Annotated[float, Field(ge=0, le=1e4)]
     movement: list[_Squares] = Field(max_length=100)
     noise: list[Annotated[list[_Row], Field(min_length=6, max_length=6)]] = Field(max_length=100)
     sizes: dict[str, Annotated[float, Field(ge=0, le=1e6)]] = {}
     means: dict[str, Finite] = {}
-    accuracy: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}  # written until 2026-11-29, of no use since
+    # Written until 2026-11-29, of no use since:
+    threshold: Annotated[float, Field(ge=0, le=1e4)] = 0.0
+    accuracy: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
     instruments: _Instruments = _Instruments()
 
 

@@ -73,19 +73,17 @@ class InstrumentNoise:
 class Tolerances:
     """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors
     (``slide thigh``) or a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6)
-    covariance of one coefficient at `REFERENCE_PERSON`; ``movement`` (B, 6) mean square of a coefficient of the wrench
-    that the null sessions' movement needs, at `REFERENCE_PERSON`; ``threshold`` of the evidence (natural logarithm)
-    that no more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a
-    nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``norms`` by kind
-    of observation (`Observation.kind`): what a laboratory's own sessions share beyond what is expected everywhere, and
-    its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is the plates' zero, an error like the other
-    sizes: it hides causes, and no noise does.
+    covariance of one coefficient at `REFERENCE_PERSON`; ``movement`` (B, 6) mean square of a coefficient of the
+    wrench that the null sessions' movement needs, at `REFERENCE_PERSON`; ``origin`` in words; ``means`` what every
+    null session shows of a nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in
+    everybody); ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share beyond
+    what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is the
+    plates' zero, an error like the other sizes: it hides causes, and no noise does.
     """
 
     sizes: Mapping[str, float]
     noise: Array
     movement: Array
-    threshold: float
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
@@ -187,7 +185,6 @@ def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
         raw.get("sizes", {}),
         np.array(raw["noise"]),
         np.array(raw["movement"]),
-        raw["threshold"],
         raw["origin"],
         raw.get("means", {}),
         _instruments(raw.get("instruments", {})),
@@ -212,7 +209,7 @@ def to_toml(found: Tolerances, *, under: str = "") -> str:
     """
     prefix = f"{under}." if under else ""
     head = [f"[{under}]"] if under else []
-    lines = [*head, f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
+    lines = [*head, f'origin = "{found.origin}"']
     lines += ["movement = [", *(f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in found.movement), "]"]
     lines.append("noise = [")
     for band in found.noise:
