@@ -20,7 +20,7 @@ from biodance.pipeline.attention import _checked, reconcile_with_checks, session
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import Attention, Judged, told_together
+from biodance.records.attention import Attention, Doubt, Judged, WrongWeight, told_together
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, diagnosis_document
@@ -172,9 +172,9 @@ def test_checks_of_one_limit_are_said_together() -> None:
 def test_another_weight_is_said_once_and_a_slip_in_session_toml_is() -> None:
     mass = Check("mass on the plates against declared", "static", "2.9 %", "at most 2 %", False, "Weigh again.")
     trial = replace(FULL.trials[0], checks=(mass,), fit=None, comparison=None, standing=None)
-    weighed = "The plates carry 72.2 kg in quiet standing, 70.2 kg are declared: check the mass."
+    weighed = WrongWeight("The plates carry 72.2 kg in quiet standing, 70.2 kg are declared: check the mass.")
     trial = replace(trial, trial=replace(trial.trial, warnings=(weighed,)))
-    session = replace(FULL.session, notes=("Warning: [trials.wlak] fits no recording of the session.",))
+    session = replace(FULL.session, notes=(Doubt("[trials.wlak] fits no recording of the session"),))
     result = replace(CALM, session=session, trials=(trial,), standing=None, still=None)
     said = session_attention(result)
     assert sum("declared" in one.text + one.about for one in said) == 1

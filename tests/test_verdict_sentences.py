@@ -21,7 +21,7 @@ from biodance.pipeline.attention import (
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.trial_result import Check, Step
 from biodance.pipeline.words import in_words
-from biodance.records.attention import Attention, Judged, strongest_first
+from biodance.records.attention import Attention, Doubt, Judged, strongest_first
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
 
@@ -67,15 +67,17 @@ def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
 def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     result = full_session()
     trials = tuple(replace(trial, checks=()) for trial in result.trials)
-    odd = replace(body(), notes=("Warning: the right thigh is 38 mm shorter than the left thigh: check the markers.",))
+    fact = "the right thigh is 38 mm shorter than the left thigh"
+    doubt = Doubt(fact, "Check the markers.", about=("right_thigh", "left_thigh"))
+    odd = replace(body(), notes=(doubt,))
     doubtful = replace(result, trials=trials, checks=(), body=odd)
     one = reconcile_with_checks(Diagnosis(True, ()), doubtful, (STATIC,))
     assert one.verdict == "unexplained"
     assert one.status is DiagnosisStatus.CANNOT_TELL
-    assert one.attention[0].text == (
-        "Nobody can tell whether anything is wrong: the right thigh is 38 mm shorter than the left thigh. Mend it, and "
-        "run this again."
-    )
+    assert one.attention[0].text == f"Nobody can tell whether anything is wrong: {fact}. Mend it, and run this again."
+    assert one.attention[1].text == f"{fact}. Check the markers."
+    mended = replace(doubtful, body=replace(odd, notes=(Doubt(fact, mended=True),)))
+    assert reconcile_with_checks(Diagnosis(True, ()), mended, (STATIC,)).status is DiagnosisStatus.CLEAN
     assert reconcile_with_checks(Diagnosis(True, (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
     thigh = replace(FOUND, effect="segment_length", target="right_thigh")
     assert reconcile_with_checks(Diagnosis(True, (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"

@@ -28,6 +28,7 @@ from biodance.motion.ik.inverse_kinematics import (
 from biodance.motion.kinematics import neighbours, poses
 from biodance.records import AngleState, Array, Markers, Motion, Trial
 from biodance.records.arrays import rate_of
+from biodance.records.attention import Doubt
 from biodance.spatial import (
     cross,
     elementary_rotation,
@@ -382,7 +383,7 @@ def hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
         return body, ()
     listed = ", ".join(name.replace("_", " ") for name in sorted(vague))
     return body.holding(vague, body.neutral), (
-        f"Warning: the markers of this trial do not determine {listed}: held straight; what they do is not known.",
+        Doubt(f"the markers of this trial do not determine {listed}: held straight; what they do is not known"),
     )
 
 

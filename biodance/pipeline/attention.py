@@ -24,10 +24,11 @@ from biodance.pipeline.words import LOAD, alternatives, cause_of, explained, nam
 from biodance.records.attention import (
     LEVELS,
     LIMIT_TOLD,
-    WARNING,
     Attention,
+    Doubt,
     Judged,
     Level,
+    WrongWeight,
     strongest_first,
     without_path,
 )
@@ -157,8 +158,6 @@ def _cannot_tell(one: Diagnosis, seen: str) -> Iterator[str]:
     yield f"{_UNTOLD}: {why}. {do}"
 
 
-_WEIGHED = "kg are declared: check the mass"
-"""What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
 _BROKEN = {
     CheckKind.FORCES: "forces and simulation of {} differ by {}",
     CheckKind.MARKERS: "markers of {} lie {} from the body",
@@ -213,8 +212,8 @@ def _more_is_wrong(
     """Return whether something is open beside the causes that are named: a check, a doubt of the body that no finding
     concerns, a trial that nobody judged.
     """
-    found = [spaced(finding.target) for finding in one.findings if finding.target]
-    doubts = [text for text in result.doubts if not any(target in text for target in found)]
+    found = {finding.target for finding in one.findings}
+    doubts = [doubt for doubt in result.doubts if not doubt.mended and found.isdisjoint(doubt.about)]
     return bool(outside or doubts or any(row.missed for row in judged))
 
 
@@ -254,9 +253,7 @@ def _not_clean(
         for what, said in _BROKEN.items()
         if one.what.startswith(what)
     )
-    doubts = tuple(
-        text.removeprefix(WARNING).partition(": check")[0].partition(". ")[0].rstrip(".") for text in result.doubts
-    )
+    doubts = tuple(one.fact for one in result.doubts if not one.mended)
     why = {Reason.LIMIT_BROKEN: broken, Reason.BODY_DOUBTFUL: doubts}
     # Only standing was judged of a session that holds movement, not even by its steps.
     static = static_trials(result)
@@ -286,16 +283,11 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
-    warned: dict[str, tuple[Level, Sequence[str]]] = {"session.toml": ("warn", result.slips)}
-    warned |= {"body": ("warn", result.doubts), "subject": ("note", result.unused)}
-    found += [
-        Attention(level, text.removeprefix(WARNING), "", about)
-        for about, (level, said) in warned.items()
-        for text in said
-    ]
-    said = [_of_trial(trial, findings) for trial in result.trials]
-    found += [line for lines in said for line in lines]
-    told = any(_WEIGHED in line.text for lines in said for line in lines)
+    warned: dict[str, tuple[Doubt, ...]] = {"session.toml": result.slips, "body": result.doubts}
+    found += [Attention("warn", one.said, "", about) for about, said in warned.items() for one in said]
+    found += [Attention("note", text, "", "subject") for text in result.unused]
+    found += [line for trial in result.trials for line in _of_trial(trial, findings)]
+    told = not cause_of(CheckKind.WEIGHT, findings) and any(_weighed(trial) for trial in result.trials)
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
     found += [_habit(one) for one in findings if one.cause.habit]
@@ -332,8 +324,14 @@ def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention
     level: Level = "fail" if trial.status == "refused" else "warn"
     if trial.trial.role == "static" and not trial.trial.warnings:
         level = "note" if all(step.status == "done" or step.name in _ON_PLATES for step in trial.steps) else level
-    said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of(CheckKind.WEIGHT, findings))]
+    explains = cause_of(CheckKind.WEIGHT, findings)
+    said = [text for text in trial.reasons if not (explains and isinstance(text, WrongWeight))]
     return [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
+
+
+def _weighed(trial: TrialResult) -> bool:
+    """Return whether a reader said of a trial that its weight is not the declared one."""
+    return any(isinstance(text, WrongWeight) for text in trial.reasons)
 
 
 def identified_attention(result: SessionResult, checks: Sequence[QualityCheck]) -> tuple[Attention, ...]:

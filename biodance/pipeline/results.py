@@ -25,7 +25,7 @@ from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing
 from biodance.records import Mask, Session, Sip, Subject, by_name
-from biodance.records.attention import WARNING, NotUsed
+from biodance.records.attention import Doubt, NotUsed
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -190,9 +190,9 @@ class SessionResult:
         return any(step.name == "stop" for steps in (self.steps, *(t.steps for t in self.trials)) for step in steps)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def doubts(self) -> tuple[Doubt, ...]:
         """What the body's notes warn about: improbable lengths, misplaced markers."""
-        return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
+        return tuple(note for note in (self.body.notes if self.body else ()) if isinstance(note, Doubt))
 
     @property
     def unused(self) -> tuple[str, ...]:
@@ -200,9 +200,9 @@ class SessionResult:
         return tuple(note for note in (self.body.notes if self.body else ()) if isinstance(note, NotUsed))
 
     @property
-    def slips(self) -> tuple[str, ...]:
+    def slips(self) -> tuple[Doubt, ...]:
         """What the session's notes warn about: lines of session.toml that fit no recording."""
-        return tuple(note for note in self.session.notes if note.startswith(WARNING))
+        return tuple(note for note in self.session.notes if isinstance(note, Doubt))
 
     @property
     def failures(self) -> Mapping[str, str]:

@@ -56,8 +56,6 @@ def seconds_left_out(reasons: Mapping[LeftOut, Mask], rate: float) -> dict[LeftO
 Level = Literal["fail", "warn", "note"]
 LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
-WARNING = "Warning: "
-"""Beginning of a note that needs a person."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")  # What may differ between two sentences of one wording
 _FEW = 4  # Trials of one check that are told one by one
 LIMIT_TOLD = ", should be "
@@ -66,6 +64,35 @@ LIMIT_TOLD = ", should be "
 
 class NotUsed(str):
     """A note on what was typed and the recordings contradict, so that it was not used."""
+
+
+class WrongWeight(str):
+    """A warning that the plates do not carry the declared weight."""
+
+
+class Doubt(str):
+    """A note that needs a person: the ``fact``, what to do ``then``, the segments, joints and markers that it is
+    ``about``, and whether it is ``mended``: nothing that is made of the recordings rests on it.
+    """
+
+    fact: str
+    then: str
+    about: tuple[str, ...]
+    mended: bool
+
+    def __new__(cls, fact: str, then: str = "", *, about: tuple[str, ...] = (), mended: bool = False) -> "Doubt":
+        """Return the note: a warning of the fact, then what to do."""
+        made = super().__new__(cls, " ".join(filter(None, (f"Warning: {fact}.", then))))
+        made.fact, made.then, made.about, made.mended = fact, then, about, mended
+        return made
+
+    @property
+    def said(self) -> str:
+        """The note without the word that marks it."""
+        return self.removeprefix("Warning: ")
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]
+        return self.fact, self.then
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import LANDMARKS, MarkerSet, canonical, landmark, read_marker_set
 from biodance.lab.markers.upright import WINDOW, posture_frames
 from biodance.records import SIDES, Array, Markers, Subject, Trial
-from biodance.records.attention import WARNING, NotUsed
+from biodance.records.attention import Doubt, NotUsed
 
 _NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
@@ -82,7 +82,7 @@ def standing(static: Trial) -> StaticPosture:
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
     notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]
     if not still:
-        notes = [f"Warning: {where}: nobody stands still in it; its frame {first} was taken for the posture."]
+        notes = [Doubt(f"{where}: nobody stands still in it; its frame {first} was taken for the posture", mended=True)]
     notes += [f"{where}: {', '.join(elsewhere)} not seen then, taken from the rest of the trial."] if elsewhere else []
     notes += [f"{where}: {', '.join(missing)} never seen, so not on the body."] if missing else []
     return StaticPosture(marker_set, points, landmarks, tuple(notes), still=still)
@@ -298,7 +298,7 @@ def _contradicted(
         and (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
     }
     said = _unlike("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)
-    return legs, f"{WARNING}{said}" if said else ""
+    return legs, Doubt(said.rstrip("."), mended=True) if said else ""
 
 
 def _unlike(name: str, typed: float | None, seen: float, between: tuple[float, float]) -> str:

@@ -27,6 +27,7 @@ from biodance.body.tables.choice import reference
 from biodance.body.tables.error_sizes import error_size
 from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array, Subject, Trial
+from biodance.records.attention import Doubt
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import elementary_rotation, zxy_angles
 
@@ -381,28 +382,29 @@ def _tilt(rotation: Array) -> float:
     return float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0))))
 
 
-def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[str]:
+def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[Doubt]:
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
     for segment in SEGMENTS:
         low, high = (ratio * subject.stature for ratio in _LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
         if not low < skeleton.lengths[segment] < high:
             notes.append(
-                f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be "
-                f"usual at {subject.stature:.2f} m: check its markers, and the stature."
+                Doubt(
+                    f"{segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be usual at "
+                    f"{subject.stature:.2f} m",
+                    "Check its markers, and the stature.",
+                    about=(segment,),
+                )
             )
         other = segment.replace("right_", "left_")
         more = skeleton.lengths[segment] - skeleton.lengths[other]
         if kind_of(segment) in LIMB_ENDS and abs(more) > _UNEQUAL * centres.sides_sd(kind_of(segment)):
             how = f"is {1e3 * abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
-            notes.append(
-                f"Warning: the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}: check the markers."
-            )
+            fact = f"the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}"
+            notes.append(Doubt(fact, "Check the markers.", about=(segment, other)))
     for joint, rotation in skeleton.turns.items():
         tilt = _tilt(rotation)
         if tilt > _TILT[joint.split("_")[1]]:
-            notes.append(
-                f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
-                f"beside it and the wand above it."
-            )
+            fact = f"{joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes"
+            notes.append(Doubt(fact, "Check the markers beside it and the wand above it.", about=(joint,)))
     return notes

@@ -19,6 +19,7 @@ from biodance.body.human.measures import (
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
+from biodance.records.attention import Doubt
 from biodance.settings import Hip
 from biodance.spatial import elementary_rotation
 
@@ -174,10 +175,11 @@ def knee_centre(place: _Places, sizes: Measures, hip: Array, pelvis_right: Array
     angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
     if abs(angle) <= _AXIS_TOLERANCE:
         return centre, ""
-    return usual, (
-        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of "
-        "march, so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial "
-        "knee marker."
+    return usual, Doubt(
+        f"the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, so "
+        "the axis is taken as square",
+        "Place the marker in the frontal plane of the thigh, or add a medial knee marker.",
+        mended=True,
     )
 
 

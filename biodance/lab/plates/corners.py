@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.records import Array, Plate, Trial, Wrench
-from biodance.records.attention import WARNING
+from biodance.records.attention import Doubt
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
@@ -266,8 +266,11 @@ def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
         apart = float(np.ptp(found, axis=0).max())
         if apart > _MOVED:
             notes.append(
-                f"{WARNING}{name} would lie up to {1000 * apart:.0f} mm elsewhere in another trial by where the feet "
-                f"stand: each trial keeps its own place. Give corners_m in [plates.{name}] of session.toml."
+                Doubt(
+                    f"{name} would lie up to {1000 * apart:.0f} mm elsewhere in another trial by where the feet stand: "
+                    "each trial keeps its own place",
+                    f"Give corners_m in [plates.{name}] of session.toml.",
+                )
             )
         elif len(found) > 1:
             place[name] = np.median(found, axis=0)

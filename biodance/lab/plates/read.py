@@ -18,6 +18,7 @@ from biodance.lab.plates.decode import FOOT_HEIGHT, LARGEST_SHARE, PlateReading,
 from biodance.lab.plates.parameters import POUND, declared_plates
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
 from biodance.records import Array, Defect, Markers, Mask, Plate, Wrench
+from biodance.records.attention import WrongWeight
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 
 _AROUND = 0.05  # m by which a sole reaches beyond its markers
@@ -221,4 +222,4 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
     for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):
         if abs(mass / body_mass / factor - 1) <= _AS_POUNDS:
             return (f"{said}: the ratio is that of {meaning}. Check ANALOG:UNITS.",)
-    return (f"{said}: check the mass, the units, and whether a foot stood beside the plates.",)
+    return (WrongWeight(f"{said}: check the mass, the units, and whether a foot stood beside the plates."),)

@@ -21,7 +21,7 @@ from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT, channel_groups, plate_parameters
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Plate, Session, Trial
-from biodance.records.attention import WARNING
+from biodance.records.attention import Doubt
 
 _KINDS = {"strike": True, "off": False}
 _KEYS = ("side", "kind", "time")
@@ -222,7 +222,7 @@ def within(time: Array, start: float, end: float) -> Mask:
 
 def unused_labels(dropped: Sequence[str], known: Collection[str]) -> list[str]:
     """Return a sentence for each dropped label that is not ``known`` from any trial: most often a slip of the pen."""
-    return [f"{WARNING}[markers] drop names {one!r}, which no trial has." for one in dropped if one not in known]
+    return [Doubt(f"[markers] drop names {one!r}, which no trial has") for one in dropped if one not in known]
 
 
 _LIMBS = tuple(name for name in MARKED_SEGMENTS if name.startswith(("right_", "left_")))

@@ -71,7 +71,7 @@ from biodance.lab.session.entries import (
 )
 from biodance.library import locate, parse_toml, read_toml
 from biodance.records import SIDES, Array, FootSizes, Role
-from biodance.records.attention import WARNING
+from biodance.records.attention import Doubt
 from biodance.settings import USUAL, Settings
 
 _ALIASES = {"calf": "shank"}  # What else a girth is called
@@ -336,14 +336,14 @@ class SessionFile:
         for key, _ in self.trials:
             if not set(key) & set("*?[") and not any(fnmatchcase(name.lower(), key.lower()) for name in names):
                 hint = did_you_mean(key, names)
-                said.append(f"{WARNING}[trials.{key}] fits no recording of the session.{hint}")
+                said.append(Doubt(f"[trials.{key}] fits no recording of the session", hint.strip()))
         return said
 
     def unused_plates(self, names: set[str]) -> list[str]:
         """Return a sentence for each ``[plates.NAME]`` that fits none of the plates that were read."""
         idle = [name for name, plate in self.plates.items() if plate.use and name not in names]
         legal = f"The plates read are {', '.join(sorted(names))}." if names else "No plate was read."
-        return [f"{WARNING}[plates.{name}] fits no plate of the session. {legal}" for name in idle]
+        return [Doubt(f"[plates.{name}] fits no plate of the session", legal) for name in idle]
 
 
 def read_session_file(folder: Path) -> SessionFile:

@@ -24,7 +24,7 @@ from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.records import Array, Role, Trial
-from biodance.records.attention import WARNING
+from biodance.records.attention import Doubt
 
 _MILLIMETRE = 1e-3
 _MASSES = ("bodymass",)
@@ -337,8 +337,11 @@ def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
         kept = first.setdefault(_bytes_of(trial), trial)
         if kept is not trial:
             notes.append(
-                f"{WARNING}{trial.source.path.name} holds the same bytes as {kept.source.path.name} and was left "
-                f"aside, or it would count twice. Move one of the two away."
+                Doubt(
+                    f"{trial.source.path.name} holds the same bytes as {kept.source.path.name} and was left aside, or "
+                    "it would count twice",
+                    "Move one of the two away.",
+                )
             )
     return [trial for trial in trials if first[_bytes_of(trial)] is trial]
 
@@ -387,8 +390,11 @@ def forces_apart(trials: Sequence[Trial]) -> list[str]:
         if len(fits) == 1:
             file, name = forces.source.path, f"{fits[0].source.path.stem}_grf{forces.source.path.suffix}"
             said.append(
-                f"{WARNING}{file.name} looks like the forces of {fits[0].source.path.name}: both cover "
-                f"{span[0]:.2f} to {span[1]:.2f} s. Rename it {name}, and they are read together."
+                Doubt(
+                    f"{file.name} looks like the forces of {fits[0].source.path.name}: both cover {span[0]:.2f} to "
+                    f"{span[1]:.2f} s",
+                    f"Rename it {name}, and they are read together.",
+                )
             )
     return said
 

@@ -50,6 +50,7 @@ from biodance.motion.ik.joint_unknowns import (
 from biodance.motion.kinematics import chains, place_jacobian, poses
 from biodance.motion.track import hold_open
 from biodance.records import Array, Index, Markers
+from biodance.records.attention import Doubt
 from biodance.threads import one_thread
 
 PLACED = "Joints placed by movement"
@@ -167,10 +168,10 @@ _NOBODY = (
 
 def _not_shown(shows: NDArray[np.bool_]) -> str:
     """Return what is said of the frames that show no posture of the body."""
-    return (
-        f"Warning: {np.count_nonzero(~shows)} of {shows.size} frames did not count in placing the joints: there the "
-        f"markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS). Look at the trials with the largest "
-        "marker distance: labels, gaps, jumps."
+    return Doubt(
+        f"{np.count_nonzero(~shows)} of {shows.size} frames did not count in placing the joints: there the markers lie "
+        f"{1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS)",
+        "Look at the trials with the largest marker distance: labels, gaps, jumps.",
     )
 
 
@@ -249,17 +250,22 @@ def _outside(joint: str, far: float) -> str:
 
 def _contradiction(joint: str, far: float) -> str:
     """Return what is said of a joint that the movement puts ``far`` m away from the static trial's place."""
-    return (
-        f"Warning: the movement contradicts the static trial about the {joint.replace('_', ' ')}: it turns about a "
-        f"point {1e3 * far:.0f} mm away, and is placed there. Check the markers from which the static trial placed it."
+    return Doubt(
+        f"the movement contradicts the static trial about the {joint.replace('_', ' ')}: it turns about a point "
+        f"{1e3 * far:.0f} mm away, and is placed there",
+        "Check the markers from which the static trial placed it.",
+        about=(joint,),
     )
 
 
 def _moved_since(joint: str, marker: str, far: float) -> str:
     """Return what is said of a marker that has moved and would pull a joint ``far`` m along."""
-    return (
-        f"Warning: the marker {marker} does not count in placing the joints: with it the {joint.replace('_', ' ')} "
-        f"would lie {1e3 * far:.0f} mm from the static trial's place. It seems to have moved since that trial."
+    return Doubt(
+        f"the marker {marker} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "
+        f"{1e3 * far:.0f} mm from the static trial's place",
+        "It seems to have moved since that trial.",
+        about=(joint, marker),
+        mended=True,
     )
 
 

@@ -13,6 +13,7 @@ from biodance.body.human.static_centres import Centres, static_sd
 from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import SIDES, Array
+from biodance.records.attention import Doubt
 from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
@@ -255,8 +256,10 @@ def _ways(centres: Centres, knee: str) -> Array:
 
 
 def _warning(knee: str, ahead: float, turned: float, far: float) -> str:
-    return (
-        f"Warning: the {knee.replace('_', ' ')} bends about an axis {abs(1e3 * ahead):.0f} mm "
+    return Doubt(
+        f"the {knee.replace('_', ' ')} bends about an axis {abs(1e3 * ahead):.0f} mm "
         f"{'before' if ahead > 0 else 'behind'} its lateral marker and {abs(np.degrees(turned)):.0f} degrees from the "
-        f"one that was marked, {far:.1f} standard deviations of how examiners differ: check the markers of that knee."
+        f"one that was marked, {far:.1f} standard deviations of how examiners differ",
+        "Check the markers of that knee.",
+        about=(knee,),
     )
