@@ -21,7 +21,7 @@ from inject import inject
 
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
-from biodance.effects import causes, check_quality
+from biodance.effects import Recorded, causes, check_quality
 from biodance.errors import BiodanceError
 from biodance.inference.session import judge
 from biodance.lab.c3d.raw import read_raw
@@ -174,7 +174,7 @@ def _with_fault(rows: Array, force: list[int], place: list[int], text: str) -> A
 
 def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
-    checks = check_quality(session, chosen=("clipping", "axis_error"))
+    checks = check_quality(Recorded(session), chosen=("clipping", "axis_error"))
     failed = tuple(Finding(one.effect, one.target, (), (), 1.0) for one in checks if not one.ok)
     said = judge(None, evidence, shipped(), causes(), Diagnosis(False, ())).diagnosis.findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))

@@ -5,7 +5,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
-from biodance.effects.time_delay import moved_in_time
+from biodance.effects.time_delay import TimeDelay, moved_in_time
 from biodance.records import Array
 
 _LEAST = 0.003
@@ -25,6 +25,7 @@ class ClockDrift(Effect):
             least=_LEAST,
         ),
     )
+    grows = TimeDelay
     separated_by = "The first trial repeated at the end of a long session."
     advice = "Run cameras and forces from one clock; drop a marker on the plate before and after."
     about = About(

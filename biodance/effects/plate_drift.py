@@ -3,6 +3,7 @@
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
+from biodance.effects.plate_offset import PlateOffset
 from biodance.records import Array
 
 _LEAST = {"N": 2.0, "N·m": 1.0}
@@ -25,6 +26,7 @@ class PlateDrift(ChannelEffect):
             least=_LEAST,
         ),
     )
+    grows = PlateOffset
     separated_by = "The first trial repeated at the end, and the empty plate before and after."
     advice = "Let the plate warm up, zero it before each trial."
     about = About(

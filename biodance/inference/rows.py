@@ -136,11 +136,22 @@ class Rows:
         """Return (n, p): what one unit of each parameter adds to the observations, in units of their own standard
         deviation.
         """
-        one, names = self.evidence, [parameter.name for parameter in effect.parameters]
+        one, kind = self.evidence, effect.grows or effect
         if one is None:
-            return np.zeros((0, len(names)))
-        own = np.array([o.sd for o in one.observations])
-        return np.asarray(one.columns(effect.name, effect.target, names) * (self.reach / own)[:, None])
+            return np.zeros((0, len(kind.parameters)))
+        columns = one.columns(kind.name, effect.target, [parameter.name for parameter in kind.parameters])
+        grown = self._grown if effect.grows else np.ones(len(columns))
+        return np.asarray(columns * (grown * self.reach / [o.sd for o in one.observations])[:, None])
+
+    @cached_property
+    def _grown(self) -> Array:
+        """(n,) by how much the middle of an observation's trial lies after the middle of the session, -0.5 to 0.5; 0
+        for trials that are not simulated: they have no place in the session's time.
+        """
+        cases = self.problem.cases if self.problem else ()
+        after = {case.trial.name: float(case.session_time.mean()) - 0.5 for case in cases}
+        seen = self.evidence.observations if self.evidence else ()
+        return np.array([after.get(one.trial, 0.0) for one in seen])
 
 
 def with_observed(

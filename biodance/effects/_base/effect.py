@@ -86,6 +86,8 @@ class Effect(Checked):
     """
     size_error: ClassVar[float] = UNLIKE
     """Share of itself by which the size that is told errs, beyond what the rows leave open."""
+    grows: ClassVar["type[Effect] | None"] = None
+    """The cause that it is at every instant, from minus half of its size at the session's start to half at its end."""
     carries: ClassVar[tuple[str, ...]] = ()
     """Joints of the model that it moves along: where a movement placed them without it, nothing beside them is accused.
     """
