@@ -7,7 +7,8 @@ import os
 import shutil
 import signal
 import sqlite3
-from concurrent.futures import ProcessPoolExecutor
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import replace
@@ -224,15 +225,21 @@ def test_only_what_hangs_on_the_recordings_is_final(tmp_path: Path, monkeypatch,
     assert process_session(task).status == ("done" if again else status)
 
 
-def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch) -> None:
+@pytest.mark.parametrize("where", ["main", "thread"])
+def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch, where: str) -> None:
+    def forever() -> None:
+        while True:
+            time.sleep(0.001)
+
     def slow(*_: object) -> tuple[SessionStatus, str, tuple, dict]:
         steps: list = []
-        attempt(steps, "track", signal.pause)
+        attempt(steps, "track", signal.pause if where == "main" else forever)
         return SessionStatus.DONE, "ran on without its step", (), {}
 
     monkeypatch.setattr("biodance.batch.work._examined", slow)
     task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f", limit=0.01)
-    found = process_session(task)
+    with ThreadPoolExecutor(1) as pool:
+        found = process_session(task) if where == "main" else pool.submit(process_session, task).result()
     assert (found.status, found.why, found.limit) == ("failed", "limit", 0.01)
     assert "Given up after 0 s; a higher --limit tries again." in (tmp_path / "out" / "s0" / "log.txt").read_text()
     assert found.is_final(task)

@@ -2,6 +2,7 @@
 done, refused or failed, and whether that is final.
 """
 
+import ctypes
 import errno
 import fcntl
 import hashlib
@@ -318,10 +319,11 @@ def _examined(
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
     """Raise `_OutOfTimeError` when what follows takes longer; in a thread that is not the main one, as those of a Dask
-    worker, nothing can be interrupted and there is no limit.
+    worker, as soon as it is back from machine code.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        with _limited_thread(seconds):
+            yield
         return
 
     def stop(*_: object) -> None:
@@ -334,6 +336,27 @@ def _limited(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+@contextmanager
+def _limited_thread(seconds: float) -> Iterator[None]:
+    """Raise `_OutOfTimeError` in this thread when what follows takes longer."""
+    thread, at_work, guard = ctypes.c_ulong(threading.get_ident()), [True], threading.Lock()
+
+    def stop() -> None:
+        with guard:  # never once the session is over
+            if at_work:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(_OutOfTimeError))
+
+    timer = threading.Timer(seconds, stop)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with guard:
+            at_work.clear()
+        timer.cancel()
 
 
 _ANGLES = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
