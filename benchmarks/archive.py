@@ -13,7 +13,6 @@ import argparse
 import json
 import os
 import random
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -127,8 +126,7 @@ def go_through(folder: Path, scheduler: str, every: float, until: float) -> Row:
             with suppress(psutil.Error):
                 memory += [client.memory_info().rss >> 20] * (time.monotonic() - began > 60 * len(memory))
             if time.monotonic() > until:
-                client.send_signal(signal.SIGINT)
-                client.wait()
+                client.kill()
             elif time.monotonic() > due and (workers := [one for one, (_, works) in family.items() if works]):
                 others = [("command", client), *(("scheduler", one) for one in served[:1])]
                 kind, victim = chance.choice(others) if chance.random() < 0.1 else ("worker", chance.choice(workers))
