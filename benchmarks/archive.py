@@ -3,10 +3,10 @@
     BIODANCE_DATA=folder python -m benchmarks archive FOLDER --sessions 10000 [--dask] [--minutes M] [--kill-every S]
 
 Sessions are real ones of three short trials, each with other noise, name and date. Fifty make a laboratory: from a date
-on a fault is in all of them, one in ten has another fault, one in twenty is broken. Of two workers one is killed every
-S seconds; one kill in ten is of the command itself or the scheduler. Once, before, the disk is full. When a laboratory
-is done, `biodance plates` is asked for its date, and its recordings become holes of the same sizes and times. Given
-again, the command goes on. FOLDER holds what was seen.
+on a fault is in all of them, one in ten has another fault, one in twenty is broken. Of two workers one is killed when
+each has worked S seconds of processor time; one kill in ten is of the command itself or the scheduler. Once, before,
+the disk is full. When a laboratory is done, `biodance plates` is asked for its date, and its recordings become holes of
+the same sizes and times. Given again, the command goes on. FOLDER holds what was seen.
 """
 
 import argparse
@@ -115,7 +115,7 @@ def go_through(folder: Path, scheduler: str, every: float, until: float) -> Row:
     what was seen of its processes: processor time, memory MB of the command itself each minute, kills.
     """
     before, began, chance = finished(folder), time.monotonic(), random.Random()
-    used, memory, killed, due = dict[int, float](), list[int](), Counter[str](), began + every
+    used, memory, killed, due = dict[int, float](), list[int](), Counter[str](), every
     command = [*BATCH, folder / "archive", "--out", folder / "results", *(["--scheduler", scheduler] * bool(scheduler))]
     with (folder / "said.txt").open("a") as said, cluster(scheduler) as served:
         client = psutil.Popen(command, stdout=said, stderr=said)
@@ -127,12 +127,14 @@ def go_through(folder: Path, scheduler: str, every: float, until: float) -> Row:
                 memory += [client.memory_info().rss >> 20] * (time.monotonic() - began > 60 * len(memory))
             if time.monotonic() > until:
                 client.kill()
-            elif time.monotonic() > due and (workers := [one for one, (_, works) in family.items() if works]):
+            elif (worked := sum(used.values()) / 2) > due and (
+                workers := [one for one, (_, works) in family.items() if works]
+            ):
                 others = [("command", client), *(("scheduler", one) for one in served[:1])]
                 kind, victim = chance.choice(others) if chance.random() < 0.1 else ("worker", chance.choice(workers))
                 with suppress(psutil.Error):
                     victim.kill()
-                    killed[kind], due = killed[kind] + 1, time.monotonic() + every
+                    killed[kind], due = killed[kind] + 1, worked + every
     after, there = finished(folder), len(list((folder / "archive").glob("*/s*")))
     return {
         "end": client.returncode, "dask": bool(scheduler), "killed": killed, "memory_mb": memory,
