@@ -199,8 +199,8 @@ def table(folder: Path) -> None:
     labs = [json.loads(path.read_text()) for path in sorted(folder.glob("lab*.json"))]
     with closing(sqlite3.connect(folder / "results" / LEDGER)) as book:
         rows = book.execute("SELECT status, reason, times FROM sessions").fetchall()
-    wall, hours = (sum(run[name] for run in runs) / 3600 for name in ("wall_s", "processor_s"))
-    memory, done = [one for run in runs for one in run["memory_mb"][2:]] or [0], sum(run["finished"] for run in runs)
+    wall, hours, done = (sum(run[name] for run in runs) for name in ("wall_s", "processor_s", "finished"))
+    wall, hours, memory = wall / 3600, hours / 3600, [mb for run in runs for mb in run["memory_mb"][2:] if mb] or [0]
     told = {
         "sessions with an outcome; in the ledger": f"{len(finished(folder))}; {len(rows)}",
         "lost in runs that came to their end": max(run["lost"] for run in runs),

@@ -85,12 +85,19 @@ def test_what_dies_is_started_again_and_costs_no_session(tmp_path: Path, dies: s
         at_work = worked(out)
         worker = int(next(out.rglob("worked.log")).read_text())
         os.kill({"client": client.pid, "worker": worker, "scheduler": scheduler.pid}[dies], signal.SIGKILL)
-        threading.Timer(1.5, (out / "go").touch).start()
+        go = threading.Timer(1.0, (out / "go").touch)
+        if dies == "worker":
+            go.start()
         said = client.communicate(timeout=180)[1]
         assert ("the Dask scheduler went away" in said) == (dies == "scheduler")
         if dies == "scheduler":
             address, _ = stack.enter_context(cluster(tmp_path / "another.json"))
-        found = run_batch(archive, out, workers=address, work=batch_work.wait_for_go)
+
+        def tell(what: str, *_: int) -> None:
+            if what == "beginning" and dies != "worker":  # what was left half done has been cleared up
+                go.start()
+
+        found = run_batch(archive, out, workers=address, work=batch_work.wait_for_go, tell=tell)
     assert found.counts == {"done": 6}, [one.reason for one in found.outcomes]
     again = {name for name, times in worked(out).items() if times > 1}
     assert again <= (set() if dies == "client" else set(at_work))
