@@ -22,6 +22,8 @@ _DIGITS = 40
 """Of a whole number: a run's number has fewer."""
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 """A number with a decimal comma."""
+_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_DEEPEST}}}""")
+"""A key of so many parts that tomllib needs minutes for what `_refuse_deep` would refuse afterwards."""
 
 
 def folder(name: str) -> Path:
@@ -90,6 +92,8 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
         It is not TOML, or nested without end.
     """
     try:
+        if _DEEP_KEY.search(text):
+            raise RecursionError
         found = tomllib.loads(text)
         _refuse_deep(found)
         return found

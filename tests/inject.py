@@ -155,11 +155,12 @@ def _bytes(numbers: Array, layout: Layout) -> bytes:
 def _put_markers(rows: Array, layout: Layout, before: Array, after: Array) -> None:
     """Overwrite the points (T, K, 3) that changed; both in file units and axes."""
     changed = ~(np.isclose(after, before, rtol=0, atol=1e-5) | (np.isnan(after) & np.isnan(before))).all(axis=2)
-    for frame, marker in np.argwhere(changed):
-        place, seen = after[frame, marker], np.isfinite(after[frame, marker]).all()
-        quad = np.array([*(place if seen else np.zeros(3)), 0.0 if seen else -1.0])
-        quad[:3] /= 1.0 if layout.floating else layout.scale
-        rows[frame, 4 * marker : 4 * marker + 4] = quad if layout.floating else np.round(quad)
+    seen = np.isfinite(after).all(axis=2, keepdims=True)
+    places = np.where(seen, after, 0.0) / (1.0 if layout.floating else layout.scale)
+    quads = np.concatenate([places, seen - 1.0], axis=2)
+    points = rows[:, : 4 * layout.points].reshape(*changed.shape, 4)
+    points[changed] = (quads if layout.floating else np.round(quads))[changed]
+    rows[:, : 4 * layout.points] = points.reshape(layout.frames, -1)
 
 
 def _put_channels(rows: Array, layout: Layout, stored: _Stored, changed: PlateRecording) -> None:

@@ -7,17 +7,17 @@ import os
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
-from concurrent.futures import ProcessPoolExecutor
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import batch_work
 import pandas as pd
 import pytest
+from batch_work import archive_of, client_of, worked
 
 import biodance
 from biodance.batch.run import LEDGER, Ledger, _submitted, run_batch
@@ -34,19 +34,6 @@ from biodance.batch.work import (
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.pipeline.trial import attempt
-
-
-def archive_of(folder: Path, count: int) -> Path:
-    """Return an archive of sessions that hold one file which is no recording."""
-    for k in range(count):
-        (folder / f"s{k}").mkdir(parents=True)
-        (folder / f"s{k}" / "walk.c3d").write_bytes(b"no recording")
-    return folder
-
-
-def worked(archive: Path, log: str = "worked.log") -> dict[str, int]:
-    """Return how many times each session was worked on."""
-    return {path.parent.name: len(path.read_text().splitlines()) for path in archive.rglob(log)}
 
 
 def test_every_session_once_and_a_second_call_does_nothing(tmp_path: Path) -> None:
@@ -108,13 +95,7 @@ def test_processes_that_die_once_are_replaced(tmp_path: Path) -> None:
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_what_ends_the_client_ends_what_is_at_work_and_a_restart_goes_on(tmp_path: Path, how: signal.Signals) -> None:
     archive, out = archive_of(tmp_path / "a", 6), tmp_path / "out"
-    program = (
-        "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
-        "if __name__ == '__main__':\n    run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.stuck,\n"
-        "        tell=lambda *said: print(*said, flush=True))"
-    )
-    words = [sys.executable, "-c", program, str(archive), str(out), str(Path(__file__).parent)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as client:
+    with client_of(archive, out, "stuck", 2) as client:
         next(line for line in client.stdout if line.startswith("s5"))
         with pytest.raises(BiodanceError, match="another run is writing here"):
             Ledger(out, archive)
@@ -217,49 +198,6 @@ def test_what_stands_out_is_measured_by_the_archive_itself() -> None:
     assert outliers(summary_table([*usual[:6], session("odd", 2.4)])) == []
 
 
-def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
-    archive = archive_of(tmp_path / "a", 3)
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
-    ) as cluster:
-        found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.count)
-        real = run_batch(archive, tmp_path / "real", workers=cluster.scheduler_address, pages=False)
-    assert found.fresh == 3
-    assert worked(archive) == {"s0": 1, "s1": 1, "s2": 1}
-    assert real.counts == {"refused": 3}, "the work itself runs in the threads of a cluster"
-
-
-def test_a_session_whose_worker_dies_on_a_cluster_is_tried_alone(tmp_path: Path) -> None:
-    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
-    archive = archive_of(tmp_path / "a", 3)
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 0}),  # a death blames all that the worker held
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster,
-    ):
-        found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.die_beside)
-    assert worked(archive) == {"s0": 1, "s1": 1}
-    assert {one.name: one.status for one in found.outcomes if one.status != "done"} == {"s2": "failed"}
-
-
-def test_a_scheduler_that_goes_away_is_one_sentence(tmp_path: Path, monkeypatch) -> None:
-    distributed = pytest.importorskip("distributed")
-
-    def lost(*_: object) -> None:
-        raise distributed.CancelledError("scheduler-connection-lost")
-
-    monkeypatch.setattr(distributed, "Client", lambda *_, **__: nullcontext())
-    monkeypatch.setattr("biodance.batch.run._on_cluster", lost)
-    with pytest.raises(BiodanceError, match=r"scheduler went away.*run the same command"):
-        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="tcp://x", work=batch_work.count)
-
-
-def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    with pytest.raises(BiodanceError, match="no Dask scheduler answers there"):
-        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="nobody://x", work=batch_work.count)
-
-
 def refused_without_room() -> BiodanceError:
     refusal = BiodanceError("results.json cannot be written")
     refusal.__cause__ = OSError(errno.ENOSPC, "No space left on device")
@@ -272,7 +210,7 @@ def refused_without_room() -> BiodanceError:
         (OSError(errno.ENOSPC, "No space left on device"), "failed", True),
         (MemoryError(), "failed", True),
         (BiodanceError("broken header"), "refused", False),
-        (refused_without_room(), "refused", True),
+        (refused_without_room(), "failed", True),
         (ZeroDivisionError("a fault of ours"), "failed", False),
     ],
 )
@@ -287,15 +225,21 @@ def test_only_what_hangs_on_the_recordings_is_final(tmp_path: Path, monkeypatch,
     assert process_session(task).status == ("done" if again else status)
 
 
-def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch) -> None:
+@pytest.mark.parametrize("where", ["main", "thread"])
+def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch, where: str) -> None:
+    def forever() -> None:
+        while True:
+            time.sleep(0.001)
+
     def slow(*_: object) -> tuple[SessionStatus, str, tuple, dict]:
         steps: list = []
-        attempt(steps, "track", signal.pause)
+        attempt(steps, "track", signal.pause if where == "main" else forever)
         return SessionStatus.DONE, "ran on without its step", (), {}
 
     monkeypatch.setattr("biodance.batch.work._examined", slow)
     task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f", limit=0.01)
-    found = process_session(task)
+    with ThreadPoolExecutor(1) as pool:
+        found = process_session(task) if where == "main" else pool.submit(process_session, task).result()
     assert (found.status, found.why, found.limit) == ("failed", "limit", 0.01)
     assert "Given up after 0 s; a higher --limit tries again." in (tmp_path / "out" / "s0" / "log.txt").read_text()
     assert found.is_final(task)

@@ -41,7 +41,16 @@ def test_no_cell_of_a_table_is_a_formula(tmp_path: Path) -> None:
     assert for_spreadsheet(-2.0) == -2.0
 
 
-@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "[" + "a." * 10_000 + "b]", "a = {b = " * 5_000])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = " + "[" * 100_000,
+        "[" + "a." * 10_000 + "b]",
+        "a = {b = " * 5_000,
+        "a." * 90_000 + "b = 1",
+        "'a' . \"b\" . " * 9_000 + "b = 1",
+    ],
+)
 def test_deep_toml_is_one_sentence(tmp_path: Path, text: str) -> None:
     (tmp_path / "lab.toml").write_text(text)
     with pytest.raises(FileRefused, match=r"lab\.toml: .*(too deeply|not valid TOML)"):
@@ -61,6 +70,12 @@ def test_a_number_that_no_computation_takes_is_one_sentence(tmp_path: Path, digi
     (tmp_path / "body.json").write_text(body_text(BODY, "").replace("1", digits, 1))
     with pytest.raises(FileRefused, match="larger than anything that is counted"):
         read_body(tmp_path / "body.json")
+
+
+def test_a_quotation_mark_that_is_never_closed_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "encoders.csv").write_text('time,hip\n0.00,0.1\n0.01,"0.2\n0.02,0.3\n0.03,0.4\n')
+    with pytest.raises(FileRefused, match=r"encoders\.csv: a quotation mark is opened and never closed"):
+        read_encoders(tmp_path / "encoders.csv")
 
 
 def test_samples_that_an_encoder_lacks_are_said(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """The work that a window has asked for: one run at a time, in a process of its own that a stop kills whole."""
 
-import shutil
 import threading
 import time
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from typing import Any
 from biodance.app.sessions import Archive, SessionPlace
 from biodance.batch.run import Ledger, Work, run_here, told_of_book
 from biodance.batch.summary import SESSIONS
-from biodance.batch.work import PART, process_session
+from biodance.batch.work import PART, clear_up, process_session
 from biodance.errors import BiodanceError
 
 _LOG = "log.txt"
@@ -89,13 +88,13 @@ class Worker:
     def _go(self, run: SessionRun, places: tuple[SessionPlace, ...]) -> None:
         try:
             with told_of_book(self._archive.out), closing(Ledger(self._archive.out, self._archive.folder)) as ledger:
-                _clear(self._archive.out / SESSIONS)
+                clear_up(self._archive.out / SESSIONS)
                 tasks = (one.task() for one in places)
                 with closing(run_here(tasks, self._work, workers=1, stop=run.stop)) as finished:
                     for task, outcome in finished:
                         ledger.write(outcome)
                         run.done.append(task.name)
-                _clear(self._archive.out / SESSIONS)
+                clear_up(self._archive.out / SESSIONS)
             state = RunState.STOPPED if run.stop.is_set() else RunState.FINISHED
         except BiodanceError as error:
             state, run.why = RunState.FAILED, str(error)
@@ -105,12 +104,6 @@ class Worker:
                 f"{self._archive.out}: cannot be worked in ({error}). Make room, or run again.",
             )
         run.seconds, run.state = time.monotonic() - run.began, state
-
-
-def _clear(folder: Path) -> None:
-    """Remove what a killed process left half done."""
-    for part in folder.glob(f"{PART}*"):
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _last_line(folder: Path) -> str:

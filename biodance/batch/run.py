@@ -7,7 +7,6 @@ What is done is written into one SQLite file in the results' folder, under a loc
 import fcntl
 import multiprocessing
 import os
-import shutil
 import signal
 import sqlite3
 import threading
@@ -23,11 +22,11 @@ from typing import TYPE_CHECKING, Any
 
 from biodance.batch.summary import SESSIONS, folder_name, write_summary
 from biodance.batch.work import (
-    PART,
     Outcome,
     SessionStatus,
     SessionTask,
     Why,
+    clear_up,
     fingerprint_of,
     outcome_of,
     process_session,
@@ -38,6 +37,7 @@ from biodance.child_process import start_forkserver
 from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.settings import assignments
+from biodance.version import __version__
 
 if TYPE_CHECKING:
     import distributed
@@ -159,7 +159,8 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     Raises
     ------
     BiodanceError
-        Dask is not installed, nobody answers at the address, or the scheduler goes away.
+        Dask is not installed, nobody answers at the address, the scheduler goes away, or it or a worker has no
+        biodance.
     """
     try:
         import distributed as dask
@@ -179,6 +180,11 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
         raise BiodanceError(
             f"--scheduler {scheduler}: the Dask scheduler went away. What was done is kept: start it again, and run "
             f"the same command."
+        ) from error
+    except (ImportError, RuntimeError) as error:
+        raise BiodanceError(
+            f"--scheduler {scheduler}: the scheduler and each worker need biodance {__version__}, as here "
+            f"({str(error).partition(chr(10))[0]})."
         ) from error
 
 
@@ -397,8 +403,7 @@ def run_batch(
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
     with told_of_book(folder), closing(Ledger(folder, archive)) as ledger:
-        for part in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
-            shutil.rmtree(part, ignore_errors=True)
+        clear_up(folder / SESSIONS)
         fresh = _work_off(tasks, ledger, workers, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
         left_out = tuple(str(path.relative_to(archive)) for path in indices)

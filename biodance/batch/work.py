@@ -2,7 +2,9 @@
 done, refused or failed, and whether that is final.
 """
 
+import ctypes
 import errno
+import fcntl
 import hashlib
 import json
 import math
@@ -10,16 +12,15 @@ import os
 import resource
 import shutil
 import signal
-import tempfile
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.session.file import FILES
@@ -190,30 +191,65 @@ def process_session(task: SessionTask) -> Outcome:
     All is written beside, flushed to the disk, and put in place at once, so that neither a killed process nor a power
     cut leaves anything half done. A session that was finished meanwhile is not gone through again.
     """
-    if (found := outcome_of(task)) and found.is_final(task):
-        return found
     started, place = time.perf_counter(), Path(task.out)
-    place.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=PART, dir=place.parent))
-    with (part / _LOG).open("w", encoding="utf-8", errors="backslashreplace") as log:
-
-        def tell(text: str) -> None:
-            log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
-            log.flush()
-
-        outcome, inputs = _attempt(task, part, tell)
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    seconds = time.perf_counter() - started
-    outcome = replace(outcome, seconds=round(seconds, 2), memory_mb=round(memory, 1), limit=task.limit)
     try:
-        (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
-        write_manifest(part, Path(task.session), inputs)
-        put_in_place(part, place)
-        shutil.rmtree(part, ignore_errors=True)  # of an earlier version of these recordings
+        with _written_alone(place) as (part, log):
+            if (found := outcome_of(task)) and found.is_final(task):
+                return found
+
+            def tell(text: str) -> None:
+                log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
+                log.flush()
+
+            outcome, inputs = _attempt(task, part, tell)
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            seconds = time.perf_counter() - started
+            outcome = replace(outcome, seconds=round(seconds, 2), memory_mb=round(memory, 1), limit=task.limit)
+            (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
+            write_manifest(part, Path(task.session), inputs)
+            put_in_place(part, place)
     except OSError as error:
-        shutil.rmtree(part, ignore_errors=True)
         return untold(task, SessionStatus.FAILED, f"{place}: {error.strerror or error}.", Why.MACHINE)
     return outcome
+
+
+@contextmanager
+def _written_alone(place: Path) -> Iterator[tuple[Path, TextIO]]:
+    """Yield an empty folder beside ``place``, and the log in it, as soon as no other process writes the same results:
+    on a cluster, the worker of a client that was killed. What is there at the end is removed.
+    """
+    part = place.parent / f"{PART}{hashlib.sha256(os.fsencode(place.name)).hexdigest()[:24]}"
+    while (log := _locked(part, fcntl.LOCK_EX)) is None:
+        pass
+    with log:
+        for left in (path for path in part.iterdir() if path.name != _LOG):  # of a process that was killed
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
+        log.truncate(0)
+        try:
+            yield part, log
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def _locked(part: Path, how: int) -> TextIO | None:
+    """Return the log in a folder, locked; None where another process has it, or has put it in place meanwhile."""
+    part.mkdir(parents=True, exist_ok=True)
+    with suppress(FileNotFoundError):
+        log = (part / _LOG).open("a", encoding="utf-8", errors="backslashreplace")
+        with suppress(FileNotFoundError, BlockingIOError):
+            fcntl.flock(log, how)
+            if os.path.samestat(os.fstat(log.fileno()), (part / _LOG).stat()):
+                return log
+        log.close()
+    return None
+
+
+def clear_up(folder: Path) -> None:
+    """Remove what killed processes left half done below the ``folder`` of sessions; what is still written stays."""
+    for part in folder.glob(f"{PART}*"):
+        if log := _locked(part, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            shutil.rmtree(part, ignore_errors=True)
+            log.close()
 
 
 def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[Outcome, dict[str, str]]:
@@ -224,7 +260,8 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tu
             status, reason, rows, inputs = _examined(task, folder, tell)
             return Outcome(task.name, task.fingerprint, status, reason, rows), inputs
     except BiodanceError as error:
-        status, why, reason = SessionStatus.REFUSED, _hangs_on(error), str(error)
+        why, reason = _hangs_on(error), str(error)
+        status = SessionStatus.REFUSED if why is Why.SESSION else SessionStatus.FAILED
     except _OutOfTimeError:
         why, reason = Why.LIMIT, f"Given up after {task.limit:.0f} s; a higher --limit tries again."
     except MemoryError:
@@ -282,10 +319,11 @@ def _examined(
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
     """Raise `_OutOfTimeError` when what follows takes longer; in a thread that is not the main one, as those of a Dask
-    worker, nothing can be interrupted and there is no limit.
+    worker, as soon as it is back from machine code.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        with _limited_thread(seconds):
+            yield
         return
 
     def stop(*_: object) -> None:
@@ -298,6 +336,27 @@ def _limited(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+@contextmanager
+def _limited_thread(seconds: float) -> Iterator[None]:
+    """Raise `_OutOfTimeError` in this thread when what follows takes longer."""
+    thread, at_work, guard = ctypes.c_ulong(threading.get_ident()), [True], threading.Lock()
+
+    def stop() -> None:
+        with guard:  # never once the session is over
+            if at_work:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(_OutOfTimeError))
+
+    timer = threading.Timer(seconds, stop)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with guard:
+            at_work.clear()
+        timer.cancel()
 
 
 _ANGLES = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")

@@ -127,15 +127,21 @@ def _numbers(body: list[tuple[int, str]], separator: str, width: int, *, commas:
     import pandas as pd
 
     text = "\n".join(line for _, line in body)
-    table = pd.read_csv(
-        io.StringIO(text),
-        sep=separator,
-        header=None,
-        decimal="," if commas else ".",
-        usecols=range(width),
-        skipinitialspace=True,
-        low_memory=False,
-    )
+    try:
+        table = pd.read_csv(
+            io.StringIO(text),
+            sep=separator,
+            header=None,
+            decimal="," if commas else ".",
+            usecols=range(width),
+            skipinitialspace=True,
+            low_memory=False,
+        )
+    except pd.errors.ParserError as error:
+        raise FileRefused(
+            f"{path}: a quotation mark is opened and never closed among the numbers. Take it out or export the file "
+            f"again."
+        ) from error
     for column in range(width):
         if not pd.api.types.is_numeric_dtype(table[column]):
             wrong = pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()
