@@ -1,6 +1,7 @@
 """Observations alone, without any model of the body: what is wrong is named with its size, chance names nothing."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from biodance.inference.rows import rows_of, with_observed
 from biodance.inference.sets import Search, hypothesis
 from biodance.observations import observe, recording
 from biodance.uncertainty.tolerances import shipped
+
+ORDER = {"first": (0.0, 0.2), "last": (0.8, 1.0)}
+"""When the simulated trials begin and end, in shares of the session."""
 
 
 def size_of(evidence, names):
@@ -103,3 +107,18 @@ def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
         assert now.expected - was.expected == pytest.approx(0.004, rel=0.01)
         assert now.norms["laboratory onset"] < 0.1 * was.norms["laboratory onset"]
         assert wrong == was
+
+
+@pytest.mark.parametrize(
+    ("drift", "steady", "target"), [("clock_drift", "time_delay", ""), ("plate_drift", "plate_offset", "plate1:Fx")]
+)
+def test_a_drift_moves_clocks_and_zeros_by_where_their_trial_lies_in_the_session(drift, steady, target) -> None:
+    """Late by half of the drift at the end, early by half at the start; a trial that is not simulated has no place."""
+    evidence = collect_evidence(session(standing(), walk(name="first"), walk(name="last"), walk(name="aside")))
+    cases = [SimpleNamespace(trial=SimpleNamespace(name=n), session_time=np.array(t)) for n, t in ORDER.items()]
+    found = replace(rows_of(None, (), shipped(), evidence), problem=SimpleNamespace(cases=tuple(cases)))
+    grows, stays = (found.observed(replace(effects()[name], target=target))[:, 0] for name in (drift, steady))
+    trial = np.array([one.trial for one in found.evidence.observations])
+    assert all(stays[trial == name].any() for name in ("first", "last", "aside"))
+    for name, share in (("first", -0.4), ("last", 0.4), ("aside", 0.0)):
+        np.testing.assert_allclose(grows[trial == name], share * stays[trial == name])

@@ -1,0 +1,10 @@
+"""Faults written into real walks: the benchmark that counts what is named runs, with a session as it was recorded."""
+
+from pathlib import Path
+
+from benchmarks.walks import scored
+
+
+def test_witnesses_alone_name_nothing_in_a_walk_without_fault(data: Path, tmp_path: Path) -> None:
+    first = next(scored(data, "c3d_parser_Sydney", tmp_path, whole=False))
+    assert (first.fault.text, first.told, first.others) == ("", "", ())
