@@ -1,12 +1,11 @@
-"""Go through an archive of thousands of sessions while processes are killed and a disk is full; print what was lost.
+"""Go through an archive of thousands of sessions while processes are killed; print what was lost.
 
     BIODANCE_DATA=folder python -m benchmarks archive FOLDER --sessions 10000 [--dask] [--minutes M] [--kill-every S]
 
 Sessions are real ones of three short trials, each with other noise, name and date. Fifty make a laboratory: from a date
 on a fault is in all of them, one in ten has another fault, one in twenty is broken. Of two workers one is killed when
-each has worked S seconds of processor time; one kill in ten is of the command itself or the scheduler. Once, before,
-the disk is full. When a laboratory is done, `biodance plates` is asked for its date, and its recordings become holes of
-the same sizes and times. Given again, the command goes on. FOLDER holds what was seen.
+each has worked S seconds of processor time; one kill in ten is of the command itself or the scheduler. When a
+laboratory is done, `biodance plates` is asked for its date, and its recordings become holes. Given again, it goes on.
 """
 
 import argparse
@@ -174,25 +173,6 @@ def finished(folder: Path) -> dict[str, int]:
     return {path.parent.name: path.stat().st_mtime_ns for path in found}
 
 
-def full_disk(sessions: list[Path]) -> Row:
-    """Go through sessions on a disk of 3 MB, and again when it has 300: return what became of them."""
-    with tempfile.TemporaryDirectory() as place:
-        archive, disk = Path(place, "archive"), Path(place, "disk")
-        archive.mkdir()
-        disk.mkdir()
-        for session in sessions:
-            (archive / session.name).symlink_to(session)
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", disk], check=True)  # for root alone
-        seen = {}
-        for what, size in (("full", "3m"), ("with room", "300m"), ("again", "300m")):
-            subprocess.run(["mount", "-o", f"remount,size={size}", disk], check=True)
-            run = subprocess.run([*BATCH, archive, "--out", disk, "--json"], capture_output=True, check=False)
-            told = json.loads(run.stdout or b"{}")
-            seen[what] = {"fresh": told.get("fresh"), "counts": told.get("counts", run.stderr.decode()[-300:])}
-        subprocess.run(["umount", disk], check=True)
-    return seen
-
-
 def table(folder: Path) -> None:
     """Print what came out so far."""
     runs = [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()]
@@ -210,7 +190,6 @@ def table(folder: Path) -> None:
         "killed": dict(sum((Counter(run["killed"]) for run in runs), Counter())),
         "command, MB: first, median, last, most": [memory[0], np.median(memory), memory[-1], max(memory)],
         "hours; of processor; sessions in one of these": f"{wall:.2f}; {hours:.2f}; {done / max(hours, 1e-9):.0f}",
-        "full disk": json.loads((folder / "full_disk.json").read_text()),
         "dates found": f"{sum(lab['found'] for lab in labs)} of {len(labs)}",
         "not found": [lab for lab in labs if not lab["found"]],
     }
@@ -231,7 +210,6 @@ def main() -> None:
     while time.monotonic() < until and labs:
         for lab in labs[:AHEAD]:
             lab.write()
-        kept(folder / "full_disk.json", lambda: full_disk(sorted(folder.glob("archive/lab0000/s0?"))))
         row = go_through(folder, "tcp://127.0.0.1:18786" * asked.dask, asked.kill_every, until)
         with (folder / "runs.jsonl").open("a") as log:
             log.write(json.dumps(row) + "\n")

@@ -1,4 +1,4 @@
-"""How wide intervals must be in every laboratory: coverage against one factor on all standard deviations.
+"""How many intervals of identification hold the truth, in every laboratory.
 
     python -m benchmarks coverage own=FOLDER/rows/own_*.json foreign=FOLDER/rows/foreign_*.json ...
 
@@ -17,36 +17,18 @@ from benchmarks.people import Row, standard_errors
 from biodance.identification.knowledge import SIGMAS
 from biodance.records import Array
 
-FACTORS, BAR = (0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.4), (0.93, 0.97)
 PARTS = {"mass": [0], "CoM": [1, 2, 3]}
 
 
-def held(z: Array, factor: float = 1.0) -> Array:
-    """Return the share (people,) of values that intervals ``factor`` times as wide hold, of ``z`` (people, ...)."""
-    return np.mean(np.abs(z) <= factor * SIGMAS, axis=tuple(range(1, z.ndim)))
+def held(z: Array) -> Array:
+    """Return the share (people,) of values that their intervals hold, of ``z`` (people, ...)."""
+    return np.mean(np.abs(z) <= SIGMAS, axis=tuple(range(1, z.ndim)))
 
 
 def spread(shares: Array, draws: int = 4000) -> Array:
     """Return the 95 % interval (2,) of the mean of ``shares`` (people,) by bootstrap over people."""
     drawn = np.random.default_rng(0).integers(0, len(shares), (draws, len(shares)))
     return np.asarray(np.percentile(shares[drawn].mean(axis=1), [2.5, 97.5]))
-
-
-def range_in_bar(z: Array) -> str:
-    """Return the factors between which the coverage lies within the bar, "none" where it jumps over it."""
-    fine = np.arange(0.4, 3.0, 0.005)
-    inside = [factor for factor in fine if BAR[0] <= held(z, factor).mean() <= BAR[1]]
-    return f"{inside[0]:.2f} to {inside[-1]:.2f}" if inside else "none"
-
-
-def factor_lines(groups: dict[str, Array], part: str) -> list[str]:
-    """Return the coverage of every group against the factor as lines of Markdown."""
-    lines = [f"| {part} | {' | '.join(f'{f:g}' for f in FACTORS)} | in the bar |", "|" + "---|" * (len(FACTORS) + 2)]
-    for name, z in groups.items():
-        shares = [held(z[:, :, PARTS[part]], factor) for factor in FACTORS]
-        cells = [f"{100 * s.mean():.1f} ({100 * a:.0f}–{100 * b:.0f})" for s in shares for a, b in [spread(s)]]
-        lines.append(f"| {name}, {len(z)} | {' | '.join(cells)} | {range_in_bar(z[:, :, PARTS[part]])} |")
-    return lines
 
 
 def rows_of(pattern: str) -> list[Row]:
@@ -60,4 +42,8 @@ def main() -> None:
     ask.add_argument("groups", nargs="+", help="NAME=FILES ...")
     named = dict(word.split("=", 1) for word in ask.parse_args().groups)
     groups = {name: np.array([standard_errors(row) for row in rows_of(files)]) for name, files in named.items()}
-    print("\n".join([*factor_lines(groups, "mass"), "", *factor_lines(groups, "CoM")]))
+    for part, places in PARTS.items():
+        for name, z in groups.items():
+            shares = held(z[:, :, places])
+            low, high = 100 * spread(shares)
+            print(f"| {part} | {name}, {len(z)} | {100 * shares.mean():.1f} ({low:.0f}-{high:.0f}) |")

@@ -1,11 +1,10 @@
 """Real people: what identification is worth on recordings of other laboratories, through the functions of the command.
 
-    BIODANCE_DATA=folder python -m benchmarks real_people FOLDER [--only paper masses halves moves filter]
+    BIODANCE_DATA=folder python -m benchmarks real_people FOLDER [--only paper masses halves]
 
 ``paper`` is the man of the laboratory of the paper, fitted on one movement, another kept; ``masses`` runners whose mass
-nobody declares; ``halves`` treadmills, one half of a trial fitted, the other kept; ``moves`` people fitted on one
-movement, another kept; ``filter`` the same with fixed cut-offs beside the one that each trial asks for. Nothing is
-chosen by hand but the roles of the trials. Rows are kept in FOLDER, so that a stopped run goes on.
+nobody declares; ``halves`` treadmills, one half of a trial fitted, the other kept. Nothing is chosen by hand but the
+roles of the trials. Rows are kept in FOLDER, so that a stopped run goes on.
 """
 
 import argparse
@@ -14,7 +13,6 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -22,16 +20,14 @@ import numpy as np
 from benchmarks.people import Row, kept
 from biodance.errors import SessionRefused
 from biodance.identification.validation import TrialValidation
-from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
 from biodance.motion.dynamics import compare
 from biodance.pipeline.diagnosis import diagnosed_and_corrected
 from biodance.pipeline.session import examine, identification_of
-from biodance.records import Array, Markers, Mask, Role, Session, Trial, Wrench
+from biodance.records import Array, Markers, Role, Session, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
-from biodance.spatial import wrench_about_point
 
-QUESTIONS = ("paper", "masses", "halves", "moves", "filter")
+QUESTIONS = ("paper", "masses", "halves")
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 RUNNERS = tuple(f"rbds/S0{n}" for n in ("01", "03", "05", "09", "12", "16", "17", "18", "20", "24"))
 MAN = {"squats": (8.0, 27.5), "march": (27.5, 61.0)}
@@ -42,21 +38,6 @@ BELTS = {
     **{f"{runner} {speed}": f"runT{speed}" for runner in RUNNERS for speed in (25, 35)},
 }
 """Sessions, or single files, on treadmills; their trials."""
-TURNS = {"HC030A": "22", "HC031A": "23", "HC032A": "18", "HC038A": "27", "HC044A": "29", "HC050A": "33", "HC055A": "34"}
-"""Children, and the end of the name of their walk with a turn; their other walk is straight."""
-MOVES = {
-    "squats to jumps": ("subject4", "squats*", "DJ*"),
-    "jumps to squats": ("subject4", "DJ*", "squats*"),
-    "walks to squats": ("subject4", "walking*", "squats*"),
-    "walks to walks": ("c3d_parser_Sydney", "*0[345]", "*0[67]"),
-    **{f"{child} straight to turn": (f"biomechzoo/{child}", f"*!{turn}", f"*{turn}") for child, turn in TURNS.items()},
-    **{f"{name} 2.5 to 3.5 m/s": (name, "*25", "*35") for name in RUNNERS},
-    **{f"{name} 3.5 to 2.5 m/s": (name, "*35", "*25") for name in RUNNERS},
-}
-"""Sessions, the trials that are fitted and those that are kept; a pattern with ! is all others than that one."""
-CUTOFFS = (3.0, 6.0, 10.0, 20.0)
-FASTEST = 50.0
-"""Hz, at most 0.45 of the rate: what is faster is no part of the wrench as recorded."""
 
 
 def read(name: str, folder: Path) -> Session:
@@ -89,14 +70,10 @@ def halves(session: Session, trial: str) -> Session:
 
 
 def fitted_on(session: Session, fitted: str, hold: str) -> Session:
-    """Return a session whose moving trials of the names ``fitted`` are fitted and those of ``hold`` kept, no other."""
-
-    def role(one: Trial) -> Role:
-        chosen = fnmatch(one.name, fitted) or (fitted.startswith("*!") and not fnmatch(one.name, f"*{fitted[2:]}"))
-        moving: Role = "validate" if fnmatch(one.name, hold) else "fit" if chosen else "skip"
-        return one.role if one.role == "static" else moving
-
-    return replace(session, trials=tuple(replace(one, role=role(one)) for one in session.trials))
+    """Return a session whose moving trial ``fitted`` is fitted and ``hold`` kept, no other."""
+    roles: dict[str, Role] = {fitted: "fit", hold: "validate"}
+    moved = (one if one.role == "static" else replace(one, role=roles.get(one.name, "skip")) for one in session.trials)
+    return replace(session, trials=tuple(moved))
 
 
 def sessions(question: str, folder: Path) -> dict[str, Callable[[], Session]]:
@@ -106,14 +83,11 @@ def sessions(question: str, folder: Path) -> dict[str, Callable[[], Session]]:
     def add(name: str, whole: Callable[[], Session], fitted: str, hold: str) -> None:
         made[name] = lambda: fitted_on(whole(), fitted, hold)
 
-    if question in ("paper", "filter"):
+    if question == "paper":
         for fitted, hold in (("march", "squats"), ("squats", "march")):
             add(f"c3d, {fitted} to {hold}", lambda: read("laas_human/c3d", folder), fitted, hold)
             add(f"raw, {fitted} to {hold}", lambda: split(read("laas_human/raw", folder), "Trial03", MAN), fitted, hold)
-    if question in ("moves", "filter"):
-        for name, (place, fitted, hold) in MOVES.items():
-            add(name, lambda place=place: read(place, folder), fitted, hold)
-    for fitted, hold in (("first", "second"), ("second", "first")) * (question in ("halves", "filter")):
+    for fitted, hold in (("first", "second"), ("second", "first")) * (question == "halves"):
         for name, trial in BELTS.items():
             add(f"{name}, {hold}", lambda n=name, t=trial: halves(read(n, folder), t), fitted, hold)
     return made
@@ -152,13 +126,10 @@ def told(name: str, row: Row) -> str:
         return f"| {name} | {row.get('refused', 'no kept trial')} |"
     rms = [np.mean([one[which] for one in row["kept"].values()], axis=0) for which in ("table", "identified")]
     means = [" -> ".join(f"{one[part].mean():.1f}" for one in rms) for part in (slice(0, 3), slice(3, 6))]
-    gain = row["gain"] or {}
-    wide = "{:.2f} ({:.2f} to {:.2f})"
+    gain, wide = row["gain"] or {}, "{:.2f} ({:.2f} to {:.2f})"
     sure = [wide.format(gain[key], *gain[f"{key}_interval"]) for key in ("force", "moment") if gain]
-    off = [" ".join((effect, target, *(f"{value:.3g} ± {sd:.2g}" for value, sd in sizes)))
-           for effect, target, sizes in row["corrected"]]  # fmt: skip
     by = " ".join(f"{value:.2f}" for value in ratios(row))
-    return f"| {name} | {' | '.join((*means, ', '.join(sure), by, ', '.join(off)))} |"
+    return f"| {name} | {' | '.join((*means, ', '.join(sure), by))} |"
 
 
 def median(rows: list[Row]) -> str:
@@ -186,39 +157,6 @@ def whole_strides(trial: Trial) -> float:
     return float(force[starts[0] : starts[-1 - (len(starts) + 1) % 2]].mean()) / STANDARD_GRAVITY
 
 
-def by_cutoff(session: Session) -> Row:
-    """Return what the identified body leaves of kept trials with each one's own cut-off and with fixed ones."""
-    result = diagnosed_and_corrected(examine(session))[0]
-    if result.identification is None or not result.identification.validations:
-        return {"refused": "nothing identified"}
-    out: Row = {"own": [one.trial.settings.filter.cutoff for one in result.trials if one.trial.role == "validate"]}
-    frames = {one.name: one.use for one in result.identification.validations}
-    for cutoff in ("auto", *CUTOFFS):
-        settings = result.settings.changed({"filter.cutoff": cutoff})
-        trials = tuple(replace(one, settings=settings) for one in result.session.trials)
-        found = identification_of(examine(replace(result.session, trials=trials)))
-        rms = [raw_difference(one, result.session[one.name], frames[one.name]) for one in found.validations]
-        out[str(cutoff)] = np.mean(rms, axis=0)
-    return out
-
-
-def raw_difference(one: TrialValidation, trial: Trial, frames: Mask) -> Array:
-    """Return the RMS over axes and ``frames`` of what an identified body leaves of the wrench as recorded, N, N·m."""
-    fastest = {"filter.force_cutoff": min(FASTEST, 0.45 * trial.markers.rate), "filter.cutoff": 10.0}
-    recorded = prepare(replace(trial, settings=trial.settings.changed(fastest))).wrench
-    off = wrench_about_point(recorded.value, one.about) - one.identified.value
-    return np.asarray(np.sqrt(np.nanmean(off[frames] ** 2, axis=0).reshape(2, 3).mean(axis=1)))
-
-
-def filtered(name: str, row: Row) -> str:
-    """Return a row of the table of cut-offs: each over the best of the fixed ones, force and moment."""
-    if "refused" in row:
-        return f"| {name} | {row['refused']} |"
-    best = np.min([row[str(cutoff)] for cutoff in CUTOFFS], axis=0)
-    over = [" ".join(f"{one:.2f}" for one in np.divide(row[str(cutoff)], best)) for cutoff in ("auto", *CUTOFFS)]
-    return f"| {name} | {', '.join(map(str, row['own']))} | {' | '.join(over)} |"
-
-
 def main() -> None:
     """Answer one question after the other, and print a table of each."""
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -232,9 +170,9 @@ def main() -> None:
                 one = kept(path, lambda: weighed(runner, asked.folder))  # noqa: B023
                 print(f"| {runner} | {100 * (one['told'] / np.mean(one['strides']) - 1):+.2f} % |", flush=True)
             continue
-        rows, work, line = [], *((by_cutoff, filtered) if question == "filter" else (judged, told))
+        rows = []
         for name, make in sessions(question, asked.folder).items():
             path = asked.folder / question / (re.sub(r"[^\w.]+", "_", name) + ".json")
-            rows.append(kept(path, lambda: work(make())))  # noqa: B023
-            print(line(name, rows[-1]), flush=True)
-        print("" if question == "filter" else f"\n{median(rows)}")
+            rows.append(kept(path, lambda: judged(make())))  # noqa: B023
+            print(told(name, rows[-1]), flush=True)
+        print(f"\n{median(rows)}")

@@ -1,10 +1,10 @@
 """Faults written into copies of real walking sessions at the level of bytes, and what is named.
 
-    BIODANCE_DATA=folder python -m benchmarks walks [--whole] [--without-static] [--only SESSION ...]
+    BIODANCE_DATA=folder python -m benchmarks walks [--without-static] [--only SESSION ...]
 
 The folder holds the public sessions named below: C3D files, and TRC with OpenSim's force files. One fault at a time is
-in every file of a copy, as in a laboratory. What witnesses name needs no inverse kinematics: a session takes two
-seconds; ``--whole`` runs the whole diagnosis, ``--without-static`` with static trials taken away.
+in every file of a copy, as in a laboratory; ``--without-static`` with static trials taken away. A copy takes some ten
+seconds.
 """
 
 import argparse
@@ -19,11 +19,8 @@ from pathlib import Path
 import numpy as np
 from inject import inject
 
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
-from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
-from biodance.effects import Recorded, causes, check_quality
+from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError
-from biodance.inference.session import judge
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
 from biodance.lab.session.read import read_session
@@ -31,7 +28,6 @@ from biodance.observations import SeenTrial, observe, recording
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Array, Session
-from biodance.uncertainty.tolerances import shipped
 from biodance.virtual_lab.causes import fault_of, parse_cause
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
@@ -172,14 +168,6 @@ def _with_fault(rows: Array, force: list[int], place: list[int], text: str) -> A
     return rows
 
 
-def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
-    """Return what checks and witnesses name in a session."""
-    checks = check_quality(Recorded(session), chosen=("clipping", "axis_error"))
-    failed = tuple(Finding(one.effect, one.target, (), (), 1.0) for one in checks if not one.ok)
-    said = judge(None, evidence, shipped(), causes(), Diagnosis(False, ())).diagnosis.findings
-    return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
-
-
 def judged(name: str, fault: Fault, found: tuple[Finding, ...]) -> Score:
     """Return the score of one session; a named truth covers if its 95 % interval holds the size that was written."""
     own = [one for one in found if (one.effect, one.target) in fault.truths[:1] and one.parameters]
@@ -209,7 +197,7 @@ def files_of(data: Path, name: str) -> list[Path]:
     return [path for path in files if not path.name.startswith(NOT_WALKED)]
 
 
-def scored(data: Path, name: str, place: Path, *, whole: bool, static: bool = True) -> Iterator[Score]:
+def scored(data: Path, name: str, place: Path, *, static: bool = True) -> Iterator[Score]:
     """Return the scores of one session, clean first, then each fault; with its ``static`` trials or without."""
     files = files_of(data, name)
     clean = read_session(copied(files, place / name / "clean", ""))
@@ -220,11 +208,8 @@ def scored(data: Path, name: str, place: Path, *, whole: bool, static: bool = Tr
     for number, fault in enumerate([Fault("nothing", "", ()), *faults_for(clean)]):
         try:
             session = read_session(copied(files, place / name / str(number), fault.text)) if fault.text else clean
-            if whole:
-                found = diagnose_session(examine(session)).diagnosis
-                yield replace(judged(name, fault, found.findings), verdict=f"{found.verdict}: ")
-            else:
-                yield judged(name, fault, named(session, collect_evidence(session)))
+            found = diagnose_session(examine(session)).diagnosis
+            yield replace(judged(name, fault, found.findings), verdict=f"{found.verdict}: ")
         except BiodanceError as error:
             yield Score(name, fault, False, False, None, f"refused: {error}")
 
@@ -253,15 +238,14 @@ def _mark(one: Score) -> str:
 def main() -> None:
     """Print what was named in each session, and the counts."""
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--whole", action="store_true")
     ask.add_argument("--without-static", action="store_true")
     ask.add_argument("--only", nargs="*", default=SESSIONS)
     asked = ask.parse_args()
     scores = []
     with tempfile.TemporaryDirectory() as place:
         for name in asked.only:
-            data, static = Path(os.environ["BIODANCE_DATA"]), not asked.without_static
-            for one in scored(data, name, Path(place), whole=asked.whole, static=static):
+            data = Path(os.environ["BIODANCE_DATA"])
+            for one in scored(data, name, Path(place), static=not asked.without_static):
                 scores.append(one)
                 mark = f"{_mark(one)} | {one.covered} | {one.verdict}{one.told}"
                 print(f"{name} | {one.fault.kind} | {mark}", flush=True)

@@ -5,6 +5,6 @@ from pathlib import Path
 from benchmarks.walks import scored
 
 
-def test_witnesses_alone_name_nothing_in_a_walk_without_fault(data: Path, tmp_path: Path) -> None:
-    first = next(scored(data, "c3d_parser_Sydney", tmp_path, whole=False))
+def test_nothing_is_named_in_a_walk_as_it_was_recorded(data: Path, tmp_path: Path) -> None:
+    first = next(scored(data, "c3d_parser_Sydney", tmp_path))
     assert (first.fault.text, first.told, first.others) == ("", "", ())

@@ -112,7 +112,7 @@ def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
 @pytest.mark.parametrize(
     ("drift", "steady", "target"), [("clock_drift", "time_delay", ""), ("plate_drift", "plate_offset", "plate1:Fx")]
 )
-def test_a_drift_moves_clocks_and_zeros_by_where_their_trial_lies_in_the_session(drift, steady, target) -> None:
+def test_a_drift_moves_clocks_and_zeros_by_where_their_trial_lies(drift, steady, target) -> None:
     """Late by half of the drift at the end, early by half at the start; a trial that is not simulated has no place."""
     evidence = collect_evidence(session(standing(), walk(name="first"), walk(name="last"), walk(name="aside")))
     cases = [SimpleNamespace(trial=SimpleNamespace(name=n), session_time=np.array(t)) for n, t in ORDER.items()]
