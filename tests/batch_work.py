@@ -41,7 +41,8 @@ def worked(archive: Path, log: str = "worked.log") -> dict[str, int]:
 def client_of(archive: Path, out: Path, work: str, workers: int | str) -> "subprocess.Popen[str]":
     """Start a process that goes through an archive with a ``work`` of `batch_work`."""
     program = (
-        "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job behind & ignores it
+        "sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
         "if __name__ == '__main__':\n    run_batch(*sys.argv[1:3], tell=lambda *said: print(*said, flush=True),\n"
         f"        workers={workers!r}, work=batch_work.{work})"
     )

@@ -212,7 +212,8 @@ class SessionResult:
     @property
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about, not computed or outside its limit."""
-        said = self.failures or self.session.refused or self.doubts or self.slips
+        open_ = any(not doubt.mended for doubt in (*self.doubts, *self.slips))
+        said = self.failures or self.session.refused or open_
         undone = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
         return bool(said) or undone or any(not check.inside for check in self.all_checks)
 
