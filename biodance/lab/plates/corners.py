@@ -261,7 +261,7 @@ def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
         for plate in trial.plates:
             if plate.put is not None:
                 puts.setdefault(plate.name, []).append(plate.put)
-    place, notes = {}, []
+    place, notes = {}, list[str]()
     for name, found in puts.items():
         apart = float(np.ptp(found, axis=0).max())
         if apart > _MOVED:

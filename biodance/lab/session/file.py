@@ -332,7 +332,7 @@ class SessionFile:
         """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
         pen. A pattern (``squat*``) is for what there may be.
         """
-        said = []
+        said: list[str] = []
         for key, _ in self.trials:
             if not set(key) & set("*?[") and not any(fnmatchcase(name.lower(), key.lower()) for name in names):
                 hint = did_you_mean(key, names)

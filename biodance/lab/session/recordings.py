@@ -382,7 +382,7 @@ def forces_apart(trials: Sequence[Trial]) -> list[str]:
     """Return a sentence for every table of forces without markers that covers the time of one .trc file without forces:
     what to call it, so that the two are read together.
     """
-    said = []
+    said: list[str] = []
     alone = [one for one in trials if one.source.format == "TRC"]
     for forces in (one for one in trials if one.source.format == "MOT" and one.plates):
         span = forces.plates[0].wrench.time[[0, -1]]
