@@ -284,11 +284,7 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
     warned: dict[str, tuple[Doubt, ...]] = {"session.toml": result.slips, "body": result.doubts}
-    found += [
-        Attention("note" if one.mended else "warn", one.said, "", about)
-        for about, said in warned.items()
-        for one in said
-    ]
+    found += [Attention(one.level, one.said, "", about) for about, said in warned.items() for one in said]
     found += [Attention("note", text, "", "subject") for text in result.unused]
     found += [line for trial in result.trials for line in _of_trial(trial, findings)]
     told = not cause_of(CheckKind.WEIGHT, findings) and any(_weighed(trial) for trial in result.trials)

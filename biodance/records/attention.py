@@ -87,6 +87,11 @@ class Doubt(str):
         return made
 
     @property
+    def level(self) -> Level:
+        """How loudly it is said."""
+        return "note" if self.mended else "warn"
+
+    @property
     def said(self) -> str:
         """The note without the word that marks it."""
         return self.removeprefix("Warning: ")
