@@ -4,7 +4,7 @@
 
 ``paper`` is the man of the laboratory of the paper, fitted on one movement, another kept; ``masses`` runners whose mass
 nobody declares; ``halves`` treadmills, one half of a trial fitted, the other kept. Nothing is chosen by hand but the
-roles of the trials. Rows are kept in FOLDER, so that a stopped run goes on.
+roles of the trials, and where the man's long table is cut. Rows are kept in FOLDER, so that a stopped run goes on.
 """
 
 import argparse

@@ -14,8 +14,8 @@ from rich.console import Console
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
-from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding
-from biodance.diagnosis.reasons import DiagnosisStatus, Reason
+from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.saved_results import provenance
@@ -88,26 +88,6 @@ def test_too_little_time_on_the_plates_asks_nobody_for_anything() -> None:
     short = Check("fully measured", "walk", "0.32 s", "at least 0.5 s", False, "Record more.")
     one = reconcile_with_checks(WHOLE, replace(CALM, checks=(short,)), (STATIC,))
     assert (one.verdict, [said.level for said in one.attention]) == ("nothing wrong", ["note", "note"])
-
-
-@pytest.mark.parametrize(
-    ("effect", "kilograms", "probability", "outside", "named"),
-    [
-        ("body_mass", 0.9, 0.97, True, True),
-        ("body_mass", 0.9, 0.97, False, False),
-        ("body_mass", 0.9, 0.6, True, False),
-        ("body_mass", 0.1, 0.97, True, False),
-        ("joint_centre", 0.9, 0.97, True, False),
-    ],
-    ids=("the cause", "limit kept", "not sure", "too small", "another cause"),
-)
-def test_a_usual_cause_is_named_where_it_explains_a_weight_outside_its_limit(
-    effect: str, kilograms: float, probability: float, outside: bool, named: bool
-) -> None:
-    one = Finding(effect, "", (Estimate("error", kilograms, 0.2, "kg"),), (), 1.0, probability=probability)
-    weighed = replace(CALM, checks=(replace(CHECKS[0], inside=not outside),))
-    found = reconcile_with_checks(replace(WHOLE, tolerated=(one,)), weighed, (STATIC,))
-    assert (found.status is DiagnosisStatus.NAMED, found.findings == (one,), found.tolerated == ()) == (named,) * 3
 
 
 def test_diagnose_begins_with_its_headline() -> None:

@@ -6,16 +6,14 @@ terminal and JSON show the same records.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from biodance.diagnosis.consequence import LIMIT, NAMED, matters
+from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.display import digits, listed, spaced
-from biodance.effects import CheckKind, Effect, QualityCheck
+from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.results import SessionResult
@@ -179,7 +177,6 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     """
     judged = stepped(judged, one.witnesses)
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
-    one = _with_what_breaks_the_weight(one, outside)
     if one.faults:
         one = replace(one, explained=one.explained and not _more_is_wrong(one, result, judged, outside))
     else:
@@ -188,22 +185,6 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
     return replace(one, attention=(first, *others))
-
-
-def _with_what_breaks_the_weight(one: Diagnosis, outside: tuple[Check, ...]) -> Diagnosis:
-    """Return the diagnosis in which a sure cause of a wrong weight is a finding where the weight is outside its limit,
-    though laboratories have it as large: what breaks a limit that somebody set matters to them.
-    """
-    if not any(check.what.startswith(CheckKind.WEIGHT) for check in outside):
-        return one
-    told = tuple(f for f in one.tolerated if f.probability >= NAMED and _changes_the_weight(f))
-    return replace(one, findings=(*one.findings, *told), tolerated=tuple(f for f in one.tolerated if f not in told))
-
-
-def _changes_the_weight(one: Finding) -> bool:
-    """Return whether a finding is of a cause that explains a wrong weight, in a size that matters."""
-    kind, size = one.cause, np.array([parameter.value for parameter in one.parameters])
-    return isinstance(kind, Effect) and CheckKind.WEIGHT in kind.explains and matters(kind, size)
 
 
 def _more_is_wrong(
