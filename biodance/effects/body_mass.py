@@ -1,5 +1,9 @@
 """The declared body mass is wrong: clothes, shoes, an old entry, another scale."""
 
+from dataclasses import dataclass, replace
+
+import numpy as np
+
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
@@ -9,10 +13,15 @@ _WRONG = 0.3
 """Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all."""
 _LEAST = 0.3
 """kg that matter: clinic scale and clothes, 0.2 kg."""
-_USUAL = 0.7
-"""kg up to which laboratories have it without calling it a fault: clothes and shoes."""
+_USUAL = 0.01
+"""Share of the mass up to which laboratories have it without calling it a fault: clothes and shoes, 0.7 kg of 70, which
+are smaller on a child.
+"""
+_ADULT = 70.0
+"""kg: whom sizes are told of where nobody is at hand."""
 
 
+@dataclass(frozen=True)
 class BodyMass(Effect):
     """An ``error`` (kg): the person weighs this much more than declared, in proportion everywhere.
 
@@ -21,9 +30,13 @@ class BodyMass(Effect):
     the typical size says.
     """
 
+    mass: float = _ADULT
+
     name = "body_mass"
     prior = 0.25
-    parameters = (Parameter("error", "kg", 0.7, "1 % of body mass for clothes and shoes", least=_LEAST, usual=_USUAL),)
+    parameters = (
+        Parameter("error", "kg", _USUAL * _ADULT, "1 % of body mass for clothes and shoes", least=_LEAST),
+    )
     separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
     advice = "Enter the mass of the day, with clothes and shoes."
     about = About(
@@ -43,6 +56,24 @@ class BodyMass(Effect):
         entry=SessionEntry.MASS,
     )
     explains = (CheckKind.WEIGHT, CheckKind.FORCES)
+
+    def at(self, target: str, case: Case) -> "BodyMass":
+        """Return the effect in the person of ``case``."""
+        return replace(super().at(target, case), mass=float(case.body.sip.mass.sum()))
+
+    def at_all_targets(self, case: Case) -> tuple["BodyMass", ...]:
+        """Return the effect in the person of ``case``."""
+        return (self.at("", case),)
+
+    @property
+    def typical(self) -> Array:
+        """(1,) kg: typical size in this person."""
+        return np.array([_USUAL * self.mass])
+
+    @property
+    def usual(self) -> float:
+        """kg: what this person's clothes and shoes weigh."""
+        return _USUAL * self.mass
 
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""

@@ -295,7 +295,7 @@ def _is_large(rows: Rows, one: NamedCause) -> bool:
         return False
     if one.course:
         return True
-    usual = one.effect.parameters[0].usual_at(one.effect.target)
+    usual = one.effect.usual
     if usual > 0 and abs(one.theta[0]) <= usual + one.covariance[0, 0] ** 0.5:
         return False
     if rows.problem is None:

@@ -122,6 +122,11 @@ class Effect(Checked):
         return np.array([parameter.typical for parameter in self.parameters])
 
     @property
+    def usual(self) -> float:
+        """Size of the first parameter up to which laboratories have it here without calling it a fault."""
+        return self.parameters[0].usual_at(self.target)
+
+    @property
     def unlike(self) -> float:
         """Share of its size by which its wrench may be unlike its model, `UNLIKE` or more."""
         return UNLIKE
