@@ -80,6 +80,14 @@ def test_a_body_mass_declared_too_small_is_positive() -> None:
     assert_close(wrench_about_origin(added("body_mass", "", mass), CENTRE), CASE.predicted)
 
 
+def test_clothes_weigh_in_proportion_to_the_person() -> None:
+    own = effect("body_mass").at("", CASE)
+    weight = float(CASE.body.sip.mass.sum())
+    for one in (own, *effect("body_mass").at_all_targets(CASE)):
+        assert one.usual == pytest.approx(0.01 * weight)
+        assert one.typical == pytest.approx([0.01 * weight])
+
+
 def test_forces_of_a_clock_that_lags_are_late_at_the_end_and_early_at_the_start() -> None:
     """A stretch of 20 samples is 10 samples late at the end, nothing in the middle, 10 early at the start."""
     late = added("clock_drift", "", 20 * CASE.motion.time[1]) + HERE

@@ -12,6 +12,7 @@ from walking import MASS, Wrong, session, standing, walk
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, Parameter
+from biodance.effects.body_mass import BodyMass
 from biodance.inference.decision import IN_SET, NAMED, places, well
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.sets import hypothesis
@@ -161,6 +162,15 @@ def test_nothing_is_wrong_where_nothing_that_matters_is_there(
     loud = posterior(holding(bare, np.log(0.8)), of_size(0.2, 5.0))
     every = replace(posterior(*beside), louder=loud)
     assert well(bare.rows, every, unknown_matters=matters) == pytest.approx(probability)
+
+
+@pytest.mark.parametrize(("person", "probability"), [(70.0, 1.0), (35.0, 0.3)])
+def test_half_a_kilogram_of_clothes_is_usual_on_an_adult_and_much_on_a_child(
+    bare: Hypothesis, person: float, probability: float
+) -> None:
+    cause = NamedCause(BodyMass(mass=person), np.array([0.5]), np.array([[0.01]]))
+    every = posterior(holding(bare, np.log(0.3)), replace(holding(bare, np.log(0.7)), causes=(cause,)))
+    assert well(bare.rows, every, unknown_matters=False) == pytest.approx(probability)
 
 
 @pytest.mark.parametrize(

@@ -186,9 +186,10 @@ def detection_limits(seen: Visibility, body: Body) -> tuple[Unobservable, ...]:
     for i, one in enumerate(seen.causes):
         here = after if one.effect.taken_up_by_calibration else seen
         limit = here.seen(i)
-        first = one.effect.parameters[one.silent.index(False)]
+        loud = one.silent.index(False)
+        first, typical = one.effect.parameters[loud], float(one.effect.typical[loud])
         limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))
-        sizes = [one.effect.reported_size(size) for size in (limit, max(limit, here.told(i)), first.typical)]
+        sizes = [one.effect.reported_size(size) for size in (limit, max(limit, here.told(i)), typical)]
         rows.append(Unobservable(*one.names, sizes[0], unit_at(first.unit, one.effect.target), *sizes[1:]))
     return tuple(rows)
 

@@ -34,9 +34,7 @@ class BodyMass(Effect):
 
     name = "body_mass"
     prior = 0.25
-    parameters = (
-        Parameter("error", "kg", _USUAL * _ADULT, "1 % of body mass for clothes and shoes", least=_LEAST),
-    )
+    parameters = (Parameter("error", "kg", _USUAL * _ADULT, "1 % of body mass for clothes and shoes", least=_LEAST),)
     separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
     advice = "Enter the mass of the day, with clothes and shoes."
     about = About(
