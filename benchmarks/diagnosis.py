@@ -19,6 +19,7 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,6 +71,8 @@ middle of a session of which only the dances are judged."""
 OWN = tuple(text for text in CAUSES if text not in UNTOLD)
 """Clear faults of our own laboratory, in turn."""
 NO_LABEL = "no label"
+CLAIMS = (0.0, 0.05, 0.5, 0.85, 0.95, 1.0)
+"""Edges between which claims are counted by their probability."""
 
 
 @dataclass(frozen=True)
@@ -209,6 +212,7 @@ def size_of(one: Finding) -> tuple[float, float]:
 def answer(one: Diagnosis, told: Told) -> Row:
     """Return what was named and what of it is false, whether the session cannot tell, sizes beside the truth."""
     names = [f"{finding.effect} {finding.target}".strip() for finding in one.findings]
+    allowed = told.beside | {effect for name in told.beside for effect in SAME.get(name, ())}
     sets = {f"{alias.effect} {alias.target}".strip() for finding in one.findings for alias in finding.set}
     head = next((said.text for said in one.attention if said.about == "diagnosis"), one.told)
     sized = [
@@ -216,9 +220,14 @@ def answer(one: Diagnosis, told: Told) -> Row:
         for name, finding in zip(names, one.findings, strict=True)
         if told.right.get(name) is not None and finding.parameters
     ]
-    allowed = told.beside | {effect for name in told.beside for effect in SAME.get(name, ())}
+    claims = [] if told.beside else [("nothing wrong", one.p_clean, not told.right)]
+    for finding in (*one.findings, *one.resembles):
+        alike = [f"{alias.effect} {alias.target}".strip() for alias in (finding, *finding.set)]
+        true = any(told.holds(name) or {name, name.split()[0]} & allowed for name in alike)
+        claims.append(("a cause", finding.probability, true))
     return {
         "verdict": one.verdict,
+        "claims": claims,
         "cannot_tell": head.lower().startswith(("cannot tell", "nobody can tell")),
         "named": names,
         "in_set": any(map(told.holds, {*names, *sets})),
@@ -238,7 +247,7 @@ def judged(job: Job) -> Row:
         except biodance.BiodanceError as error:
             told, start = Told(), time.process_time()
             said = {"verdict": f"refused: {error}", "cannot_tell": True, "named": [], "in_set": False, "exact": False}
-            said |= {"false": [], "sizes": []}
+            said |= {"false": [], "sizes": [], "claims": []}
     spent = time.process_time() - start
     return said | {"column": job.column, "key": job.key, "fault": bool(told.right), "unknown": told.unknown, "s": spent}
 
@@ -267,29 +276,34 @@ def jobs(columns: list[str], kinds: list[str], sessions: int, first: int) -> lis
 
 
 def table(rows: list[Row]) -> list[str]:
-    """Return the demands as a table: how often, of how many, in each column."""
+    """Return the demands as a table: how often, of how many, in each column; and how many claims of a probability are
+    true: of every cause with its set, and that nothing is there that matters.
+    """
     alarm = ("unexplained", "named, incomplete", "named, complete")
-    demands: dict[str, Callable[[Row], bool | None]] = {
-        "without fault: a false name": lambda one: None if one["fault"] else bool(one["false"]),
+    demands: dict[str, Callable[[Row], list[bool]]] = {
+        "without fault: a false name": lambda one: [bool(one["false"])] * (not one["fault"]),
         "without fault: a false name or an alarm": (
-            lambda one: None if one["fault"] else bool(one["false"]) or (one["verdict"] in alarm and not _unsure(one))
+            lambda one: [bool(one["false"]) or (one["verdict"] in alarm and not _unsure(one))] * (not one["fault"])
         ),
-        "without fault: says that it cannot tell": lambda one: None if one["fault"] else _unsure(one),
-        "a clear fault: not nothing wrong": lambda one: one["verdict"] != "nothing wrong" if one["fault"] else None,
-        "a clear fault: named": lambda one: one["exact"] if one["fault"] and not one["unknown"] else None,
-        "a clear fault: named or in the set": lambda one: (
-            one["in_set"] if one["fault"] and not one["unknown"] else None
-        ),
-        "a clear fault: an innocent named": lambda one: bool(one["false"]) if one["fault"] else None,
-        "no file describes it: unexplained": lambda one: one["verdict"] == "unexplained" if one["unknown"] else None,
+        "without fault: says that it cannot tell": lambda one: [_unsure(one)] * (not one["fault"]),
+        "a clear fault: not nothing wrong": lambda one: [one["verdict"] != "nothing wrong"] * one["fault"],
+        "a clear fault: named": lambda one: [one["exact"]] * (one["fault"] and not one["unknown"]),
+        "a clear fault: named or in the set": lambda one: [one["in_set"]] * (one["fault"] and not one["unknown"]),
+        "a clear fault: an innocent named": lambda one: [bool(one["false"])] * one["fault"],
+        "no file describes it: unexplained": lambda one: [one["verdict"] == "unexplained"] * one["unknown"],
+        "95 % interval of the size holds the truth": lambda one: [size[4] for size in one["sizes"]],
     }
+    for what, (low, high) in product(("a cause", "nothing wrong"), pairwise(CLAIMS)):
+        demands[f"{what}, P {low:g} to {high:g}: true"] = partial(_true, what, low, high)
     lines = [f"| | {' | '.join(COLUMNS)} |", "|" + "---|" * (len(COLUMNS) + 1)]
     for demand, test in demands.items():
-        hits = {c: [hit for one in rows if one["column"] == c and (hit := test(one)) is not None] for c in COLUMNS}
-        lines.append(f"| {demand} | {' | '.join(_share(hits[column]) for column in COLUMNS)} |")
-    sizes = {c: [size[4] for one in rows if one["column"] == c for size in one["sizes"]] for c in COLUMNS}
-    lines.append(f"| 95 % interval of the size holds the truth | {' | '.join(_share(sizes[c]) for c in COLUMNS)} |")
+        hits = [[hit for one in rows if one["column"] == c for hit in test(one)] for c in COLUMNS]
+        lines.append(f"| {demand} | {' | '.join(map(_share, hits))} |")
     return lines
+
+
+def _true(what: str, low: float, high: float, one: Row) -> list[bool]:
+    return [true for kind, p, true in one["claims"] if kind == what and low <= p < high + (high == 1)]
 
 
 def _unsure(one: Row) -> bool:

@@ -55,13 +55,9 @@ class BodyMass(Effect):
     )
     explains = (CheckKind.WEIGHT, CheckKind.FORCES)
 
-    def at(self, target: str, case: Case) -> "BodyMass":
+    def sized_for(self, case: Case) -> "BodyMass":
         """Return the effect in the person of ``case``."""
-        return replace(super().at(target, case), mass=float(case.body.sip.mass.sum()))
-
-    def at_all_targets(self, case: Case) -> tuple["BodyMass", ...]:
-        """Return the effect in the person of ``case``."""
-        return (self.at("", case),)
+        return replace(self, mass=float(case.body.sip.mass.sum()))
 
     @property
     def typical(self) -> Array:

@@ -1,5 +1,7 @@
 """The clocks of forces and markers run at different rates."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from biodance.effects._base.case import Case
@@ -10,17 +12,26 @@ from biodance.records import Array
 
 _LEAST = 0.003
 """s that matter: a third of a frame at 100 Hz."""
+_RATE, _MINUTE = 0.01 / 60, 60.0
+"""s per recorded second by which clocks that are not one typically run apart, and s of a session where none is at hand.
+"""
 
 
+@dataclass(frozen=True)
 class ClockDrift(Effect):
-    """A ``stretch`` (s over the session): forces this much later at the end than at the start, against the markers."""
+    """A ``stretch`` (s over the session): forces this much later at the end than at the start, against the markers.
+
+    Clocks differ in their rates: the typical stretch is in proportion to what was recorded, ``seconds`` s.
+    """
+
+    seconds: float = _MINUTE
 
     name = "clock_drift"
     parameters = (
         Parameter(
             "stretch",
             "s",
-            0.01,
+            _RATE * _MINUTE,
             "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs",
             least=_LEAST,
         ),
@@ -38,6 +49,16 @@ class ClockDrift(Effect):
         "the clocks of cameras and plates drift {size}{between} apart", f"Use one clock, {ACCEPT}", "a drifting clock"
     )
     explains = (CheckKind.FORCES,)
+
+    def sized_for(self, case: Case) -> "ClockDrift":
+        """Return the effect in the session of ``case``."""
+        share, time = float(np.ptp(case.session_time)), case.motion.time
+        return replace(self, seconds=float(time[-1] - time[0]) / share) if share > 0 else self
+
+    @property
+    def typical(self) -> Array:
+        """(1,) s: typical stretch of this session."""
+        return np.array([_RATE * self.seconds])
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces are late by stretch times (session time - 1/2)."""

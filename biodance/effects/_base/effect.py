@@ -102,11 +102,17 @@ class Effect(Checked):
         legal = self.targets(case)
         if target not in legal:
             raise UnknownName.of(f"target of {self.name}", target, legal)
-        return replace(self, target=target)
+        return replace(self, target=target).sized_for(case)
 
     def at_all_targets(self, case: Case) -> tuple["Effect", ...]:
         """Return the effect at every legal target in ``case``."""
-        return tuple(replace(self, target=target) for target in self.targets(case))
+        return tuple(replace(self, target=target).sized_for(case) for target in self.targets(case))
+
+    def sized_for(self, case: Case) -> "Effect":
+        """Return the effect with the sizes that are typical of the person or session of ``case``; by default the same
+        everywhere.
+        """
+        return self
 
     @property
     def linear(self) -> bool:
