@@ -71,6 +71,8 @@ middle of a session of which only the dances are judged."""
 OWN = tuple(text for text in CAUSES if text not in UNTOLD)
 """Clear faults of our own laboratory, in turn."""
 NO_LABEL = "no label"
+JOINTED = frozenset({"trunk_joint", "head_joint", "shoulder_girdle"})
+"""What the bodies of the third laboratory have: a spine of three joints, and clavicles."""
 CLAIMS = (0.0, 0.05, 0.5, 0.85, 0.95, 1.0)
 """Edges between which claims are counted by their probability."""
 
@@ -159,7 +161,7 @@ def third(seed: int, fault: str, folder: Path) -> tuple[SessionResult, Told]:
     true = truth_of("third", folder / "s")
     result = biodance.examine(biodance.read_session(folder / "s"))
     right, beside = expected(true, world_to_read(result, true["static"]["markers_m"])[0])
-    return result, Told(right, frozenset(beside))
+    return result, Told(right, JOINTED | beside)
 
 
 def expected(true: Row, turn: Array) -> tuple[dict[str, float | None], set[str]]:
@@ -248,8 +250,8 @@ def judged(job: Job) -> Row:
             told, start = Told(), time.process_time()
             said = {"verdict": f"refused: {error}", "cannot_tell": True, "named": [], "in_set": False, "exact": False}
             said |= {"false": [], "sizes": [], "claims": []}
-    spent = time.process_time() - start
-    return said | {"column": job.column, "key": job.key, "fault": bool(told.right), "unknown": told.unknown, "s": spent}
+    said |= {"column": job.column, "key": job.key, "fault": bool(told.right), "unknown": told.unknown}
+    return said | {"s": time.process_time() - start}
 
 
 def jobs(columns: list[str], kinds: list[str], sessions: int, first: int) -> list[Job]:

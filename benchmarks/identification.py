@@ -21,10 +21,8 @@ def table(some: list[Row]) -> list[str]:
           for which in ("table", "identified") for what in ("mass", "com")}  # fmt: skip
     bias = np.array([np.subtract(row["identified"]["mass"], row["true"]["mass"]) for row in some]).mean(axis=0)
     z = np.array([standard_errors(row) for row in some])
-    lines = [
-        "| segment | mass kg: table, identified | bias | rms z | covered % | CoM mm: table, identified | covered % |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    head = "| segment | mass kg: table, identified | bias | rms z | covered % | CoM mm: table, identified | covered % |"
+    lines = [head, "|---" * 7 + "|"]
     for i, name in enumerate(some[0]["segments"]):
         mass, com = ([of[which, what][:, i].mean() for which in ("table", "identified")] for what in ("mass", "com"))
         inside = [held(z[:, i, part]).mean() for part in PARTS.values()]

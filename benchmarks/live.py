@@ -2,9 +2,9 @@
 
     OMP_NUM_THREADS=1 python -m benchmarks live FILE.c3d ...
 
-A row a recording. The static trial is that of its folder. Faults begin in the middle: 30 N
-on Fz of the plate that then bears most, the same plate falls silent, LASI and RASI are exchanged, a knee's marker sits
-120 mm lower. Said is after how many seconds the right one is named, or that it is not; what else is named is counted.
+A row a recording. The static trial is that of its folder. Faults begin in the middle: 30 N on Fz of the plate that then
+bears most, the same plate falls silent, LASI and RASI are exchanged, a knee's marker sits 120 mm lower. Said is after
+how many seconds the right one is named, or that it is not; what else is named is counted.
 """
 
 import argparse

@@ -172,6 +172,7 @@ def judged(name: str, fault: Fault, found: tuple[Finding, ...]) -> Score:
     """Return the score of one session; a named truth covers if its 95 % interval holds the size that was written."""
     own = [one for one in found if (one.effect, one.target) in fault.truths[:1] and one.parameters]
     low_high = own[0].parameters[0].interval if own and fault.size else None
+    sizes = [", ".join(f"{p.value:.3g} ± {p.sd:.2g} {p.unit}" for p in one.parameters) for one in found]
     sets = [{(one.effect, one.target), *((a.effect, a.target) for a in one.set)} for one in found]
     return Score(
         name,
@@ -179,13 +180,9 @@ def judged(name: str, fault: Fault, found: tuple[Finding, ...]) -> Score:
         bool(found) and (found[0].effect, found[0].target) in fault.truths,
         any(truth in some for truth in fault.truths for some in sets),
         None if low_high is None else low_high[0] <= fault.size <= low_high[1],
-        "; ".join(f"{one.effect} {one.target} {_sizes(one)}" for one in found),
+        "; ".join(f"{one.effect} {one.target} {size}" for one, size in zip(found, sizes, strict=True)),
         tuple((one.effect, one.target) for one, some in zip(found, sets, strict=True) if some.isdisjoint(fault.truths)),
     )
-
-
-def _sizes(one: Finding) -> str:
-    return ", ".join(f"{p.value:.3g} ± {p.sd:.2g} {p.unit}" for p in one.parameters)
 
 
 def files_of(data: Path, name: str) -> list[Path]:
@@ -216,8 +213,10 @@ def scored(data: Path, name: str, place: Path, *, static: bool = True) -> Iterat
 
 def table(scores: list[Score]) -> list[str]:
     """Return the summary as a table: one line a fault."""
-    lines = ["| written | sessions | named first | first or in the set | interval covers | innocents |"]
-    lines.append("|---" * 6 + "|")
+    lines = [
+        "| written | sessions | named first | first or in the set | interval covers | innocents |",
+        "|---" * 6 + "|",
+    ]
     every, clean = [one for one in scores if one.fault.text], [one for one in scores if not one.fault.text]
     known = {(one.session, name) for one in clean for name in one.others}
     for kind in (*dict.fromkeys(one.fault.kind for one in every), "all"):
@@ -231,22 +230,16 @@ def table(scores: list[Score]) -> list[str]:
     return lines
 
 
-def _mark(one: Score) -> str:
-    return "" if not one.fault.text else "first" if one.first else "in the set" if one.listed else "MISSED"
-
-
 def main() -> None:
     """Print what was named in each session, and the counts."""
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--without-static", action="store_true")
     ask.add_argument("--only", nargs="*", default=SESSIONS)
-    asked = ask.parse_args()
-    scores = []
+    asked, scores = ask.parse_args(), []
     with tempfile.TemporaryDirectory() as place:
         for name in asked.only:
-            data = Path(os.environ["BIODANCE_DATA"])
-            for one in scored(data, name, Path(place), static=not asked.without_static):
+            for one in scored(Path(os.environ["BIODANCE_DATA"]), name, Path(place), static=not asked.without_static):
                 scores.append(one)
-                mark = f"{_mark(one)} | {one.covered} | {one.verdict}{one.told}"
-                print(f"{name} | {one.fault.kind} | {mark}", flush=True)
+                mark = "first" if one.first else "in the set" if one.listed else "MISSED" if one.fault.text else ""
+                print(f"{name} | {one.fault.kind} | {mark} | {one.covered} | {one.verdict}{one.told}", flush=True)
     print("\n".join(["", *table(scores)]))

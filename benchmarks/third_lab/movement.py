@@ -7,7 +7,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import solve_banded
 from scipy.spatial.transform import Rotation
 
-from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Array
 from benchmarks.third_lab.people import Person
 from benchmarks.third_lab.skeleton import COLUMNS, GRAVITY, SIDES, WIDTH, find_wrench, pose_segments
 

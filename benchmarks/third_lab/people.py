@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Array
 from benchmarks.third_lab.skeleton import PARENTS, SIDES
 
 # Shares of body mass, %: head and neck, thorax and abdomen, pelvis, upper arm, forearm, hand, thigh, shank, foot.

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from benchmarks.third_lab.arrays import Array
-from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.faults import Array, Fault
 
 Pair = tuple["Plate", "Plate"]
 DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a plate that is not turned: x as the world's, z down

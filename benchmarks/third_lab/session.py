@@ -7,8 +7,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from benchmarks.third_lab.arrays import Array
-from benchmarks.third_lab.faults import Fault, draw_fault
+from benchmarks.third_lab.faults import Array, Fault, draw_fault
 from benchmarks.third_lab.markers import Places, film, name_markers, place_markers, see
 from benchmarks.third_lab.movement import realize
 from benchmarks.third_lab.people import Person, draw_person

@@ -8,7 +8,7 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Array
 
 if TYPE_CHECKING:
     from benchmarks.third_lab.people import Person

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.signal import bilinear, lfilter
 
-from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Array
 from benchmarks.third_lab.people import Person
 from benchmarks.third_lab.skeleton import COLUMNS, GRAVITY, PARENTS, SIDES, pose_segments
 

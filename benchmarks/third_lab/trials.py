@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Array
 from benchmarks.third_lab.movement import KNOTS, Plan, ease
 from benchmarks.third_lab.people import Person
 from benchmarks.third_lab.skeleton import NAMES, SIDES

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
 
-from benchmarks.third_lab.arrays import Array
-from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.faults import Array, Fault
 from benchmarks.third_lab.movement import Plan
 from benchmarks.third_lab.people import Person
 from benchmarks.third_lab.skeleton import find_wrench, pose_segments

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline
 
-from benchmarks.third_lab.arrays import Array
-from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.faults import Array, Fault
 from benchmarks.third_lab.people import Person
 from benchmarks.third_lab.plates import Plate, find_corners, split_kistler
 from benchmarks.third_lab.skeleton import NAMES, PARENTS, SIDES, pose_segments
