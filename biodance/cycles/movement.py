@@ -17,7 +17,15 @@ from biodance.cycles.beside import (
     emg_curves,
     file_curves,
 )
-from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
+from biodance.cycles.curves import (
+    CurveGroup,
+    CycleCurve,
+    angle_curves,
+    ground_curves,
+    group_curves,
+    lab_curves,
+    load_curves,
+)
 from biodance.cycles.cut import (
     PERCENT,
     Cycle,
@@ -30,16 +38,14 @@ from biodance.cycles.cut import (
     repetitions,
     replaced_events,
 )
-from biodance.cycles.ground import ground_curves
-from biodance.cycles.jumps import jumps
-from biodance.cycles.lifts import lift
+from biodance.cycles.lifts import jumps, lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, FootEvent, Mask, Motion, Sip, Trial
+from biodance.records import Array, FootEvent, Motion, Sip, Trial
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -231,12 +237,16 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    known_of_feet = np.zeros((motion.time.size, 2), dtype=bool) if contact is None else contact.told
+    nowhere = np.zeros(motion.time.size, dtype=bool)
+    shared = nowhere if contact is None else np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
+    known_of_feet = np.stack([nowhere, nowhere], axis=1) if contact is None else contact.told
     jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
     lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*gait_cycles(trial.name, events), *lifts, *jumped)
     cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
-    sure, whole = _fully_measured(contact, motion.time.size), np.asarray(known_of_feet.all(axis=1))
+    whole = np.asarray(known_of_feet.all(axis=1))
+    sure = whole & ~shared
+    on_one = [one for one in cycles if shared[(motion.time >= one.start) & (motion.time <= one.end)].any()]
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
@@ -244,7 +254,8 @@ def trial_movement(
         theirs += file_curves(cycle, outputs, motion.time, own)
         curves += emg_curves(cycle, outputs)
         if contact is not None and feet is not None:
-            known = _known_loads(cycle, contact)
+            # in gait the force under a foot does not count while both are on one plate
+            known = contact.told & ~shared[:, None] if cycle.kind == "gait" else contact.told
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
             curves += ground_curves(cycle, body, motion, soles, feet, known)
     return TrialMovement(
@@ -258,41 +269,18 @@ def trial_movement(
         compare_events(events, outputs),
         tuple(theirs),
         tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
-        tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
-        _notes(cycles, contact),
+        tuple(one for one in on_one if one.kind == "gait"),
+        _notes(cycles, on_one, contact),
     )
 
 
-def _known_loads(cycle: Cycle, contact: Contact) -> Mask:
-    """Return (T, 2) where the force under each foot counts; in gait not while both feet are on one plate."""
-    return contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
-
-
-def _fully_measured(contact: Contact | None, frames: int) -> Mask:
-    """Return (T,) where the plates tell the force under each foot; nowhere without plates."""
-    return np.zeros(frames, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
-
-
-def _on_one_plate(cycle: Cycle, contact: Contact | None) -> bool:
-    """Return whether both feet were on one plate at some time of a cycle."""
-    return contact is not None and bool((_shared(contact) & _inside(cycle, contact)).any())
-
-
-def _shared(contact: Contact) -> Mask:
-    """Return (T,) where both feet are on one plate."""
-    return np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
-
-
-def _inside(cycle: Cycle, contact: Contact) -> Mask:
-    return np.asarray((contact.time >= cycle.start) & (contact.time <= cycle.end))
-
-
-def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+def _notes(cycles: Sequence[Cycle], on_one: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+    """Return what a person should know of the ``cycles``, of which ``on_one`` had both feet on one plate."""
     if not cycles:
         return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
-    if any(np.any(_shared(contact) & _inside(one, contact)) for one in cycles if one.kind != "gait"):
+    if any(one.kind != "gait" for one in on_one):
         return (
             "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
             "difference between left and right moments is not measured.",
