@@ -1,5 +1,5 @@
-"""Shared by all commands: the application, exit codes, common options and terminal output; what is being done and how long
-it will take, on stderr: one updated line on a terminal, else a plain line every few seconds.
+"""Shared by all commands: the application, exit codes, common options and terminal output; what is being done and how
+long it will take, on stderr: one updated line on a terminal, else a plain line every few seconds.
 """
 
 import re

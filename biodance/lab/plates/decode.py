@@ -5,7 +5,7 @@ Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Vi
 types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -66,26 +66,12 @@ class Decisions:
 class PlateReading:
     """A plate whose directions are not yet decided.
 
-    Attributes
-    ----------
-    plate : PlateParameters
-        What the file says.
-    corners, axes, half : Array
-        (4, 3) m in the lab frame; lab_R_plate (3, 3); half the sides (2,) m along the plate's x and y.
-    sensor : Array
-        (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero taken off.
-    vector : Array
-        (3,) m from the sensor to the centre of the surface, plate axes, as the file says.
-    rate : float
-        Hz of the samples.
-    empty : Array
-        (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded.
-    known : Array
-        (S,) False where a channel holds no number; ``sensor`` then keeps the nearest known sample, for decisions only.
-    decisions : Decisions
-        What was decided.
-    warnings : tuple of str
-        What a person should look at, beside odd corners, origins and gaps.
+    ``plate`` what the file says; ``corners`` (4, 3) m in the lab frame; ``axes`` lab_R_plate (3, 3); ``half`` the sides
+    (2,) m along the plate's x and y; ``sensor`` (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero
+    taken off; ``vector`` (3,) m from the sensor to the centre of the surface, plate axes, as the file says; ``rate``
+    Hz; ``empty`` (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded; ``known`` (S,)
+    False where a channel holds no number (``sensor`` keeps the nearest known sample, for decisions only); what was
+    decided, step by step, and ``warnings`` beside odd corners, origins and gaps.
     """
 
     plate: PlateParameters
@@ -136,32 +122,11 @@ def decode_plates(
     not applied where with it the plates carry less than half or more than twice the weight, and without it, within
     15 %, all of it.
 
-    Parameters
-    ----------
-    raw : RawC3d
-        The file.
-    plates : sequence of PlateParameters
-        What it says of each plate.
-    metres : float
-        The file's length unit in m.
-    turn : Array
-        (3, 3), from file axes to the lab.
-    mass : float or None
-        kg of the person, None = not known.
-
-    Returns
-    -------
-    DecodedPlates
-        A plate is refused whose corners, ORIGIN or channels make no sense; the sentence says which value and what
-        would be legal.
+    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab, ``mass`` kg of the
+    person, None = not known. A plate is refused whose corners, ORIGIN or channels make no sense; the sentence says
+    which value and what would be legal.
     """
-    placed, refused = [], {}
-    for plate in plates:
-        try:
-            placed.append((plate, _geometry(plate, metres, turn)))
-        except TrialRefused as error:
-            refused[plate.number] = str(error)
-    done, lost = _decode_each(raw, placed, refused)
+    done, lost = _decode_each(raw, plates, metres, turn)
     used = [column for reading in done for column in reading.plate.channels]
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
         return _DecodedPlates(done, lost, ())
@@ -170,7 +135,7 @@ def decode_plates(
         return _DecodedPlates(done, lost, ())
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
-    plain, lost_plain = _decode_each(stored, placed, refused)
+    plain, lost_plain = _decode_each(stored, plates, metres, turn)
     whole = _weight_share(plain, mass)
     if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
         return _DecodedPlates(done, lost, ())
@@ -214,13 +179,13 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
 
 
 def _decode_each(
-    raw: RawC3d, placed: Sequence[tuple[PlateParameters, _Geometry]], refused: Mapping[int, str]
+    raw: RawC3d, plates: Sequence[PlateParameters], metres: float, turn: Array
 ) -> tuple[list[PlateReading], dict[int, str]]:
-    """Return the readings of the plates that make sense, and by number why others are refused, too."""
-    readings, lost = [], dict(refused)
-    for plate, place in placed:
+    """Return the readings of the plates that make sense, and by number why others are refused."""
+    readings, lost = [], {}
+    for plate in plates:
         try:
-            readings.append(_decode(raw, plate, place))
+            readings.append(_decode(raw, plate, _geometry(plate, metres, turn)))
         except TrialRefused as error:
             lost[plate.number] = str(error)
     return readings, lost
