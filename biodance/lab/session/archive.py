@@ -136,7 +136,12 @@ def read_plate_text(path: Path) -> Trial:
             f"{path}: its header does not name {', '.join(lacking)}. Write a first line such as Time[s], Fx[N], Fy[N], "
             f"Fz[N], Mx[Nm], My[Nm], Mz[Nm]."
         )
-    raw = np.array([_values(line, path, number) for number, line in enumerate(lines[1:], start=2)])
+    raw = np.array(
+        [
+            [parse_number(cell, f"{path}, line {k}") for cell in _cells(line)]
+            for k, line in enumerate(lines[1:], start=2)
+        ]
+    )
     time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
     wrench = np.column_stack(value)
     sign = -1.0 if wrench[:, 2].mean() < 0 else 1.0
@@ -149,10 +154,6 @@ def read_plate_text(path: Path) -> Trial:
 
 def _cells(line: str) -> list[str]:
     return cells(line) if "," not in line and ";" not in line else [cell.strip() for cell in re.split("[,;]", line)]
-
-
-def _values(line: str, path: Path, number: int) -> list[float]:
-    return [parse_number(cell, f"{path}, line {number}") for cell in _cells(line)]
 
 
 def _factor(channel: str, unit: str, path: Path) -> float:
@@ -210,20 +211,16 @@ def _collect(folder: Path, sessions: list[Path], indices: list[Path]) -> None:
     if index is not None:
         indices.append(index)
         return
-    below = sorted(
-        path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".") and not _leads_up(path)
-    )
+    above = folder.resolve()
+    below = [path for path in sorted(folder.iterdir()) if path.is_dir() and not path.name.startswith(".")]
+    # below a link to a folder above there would be no end
+    below = [path for path in below if not (path.is_symlink() and above.is_relative_to(path.resolve()))]
     parts = [path for path in below if _PART_FOLDERS.match(path.name) and recordings_in(path)]
     if parts or recordings_in(folder):
         sessions.append(folder)
     for path in below:
         if path not in parts:
             _collect(path, sessions, indices)
-
-
-def _leads_up(folder: Path) -> bool:
-    """Return whether a folder is a link to one above it, below which there would be no end."""
-    return folder.is_symlink() and folder.parent.resolve().is_relative_to(folder.resolve())
 
 
 def visit_date(folder: Path) -> str:

@@ -115,14 +115,11 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
 
 def _shoulder_rise(at: Mapping[str, Array]) -> tuple[float, float]:
     """Return by which share of the stature lifted arms raise the acromion markers, and its standard deviation."""
-    arms = [at[f"{side}_elbow_lateral"] - at[f"{side}_acromion"] for side in SIDES if _has_arm(at, side)]
+    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
+    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
     rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
     return rise, rise / 2
-
-
-def _has_arm(at: Mapping[str, Array], side: str) -> bool:
-    return f"{side}_elbow_lateral" in at and f"{side}_acromion" in at
 
 
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
