@@ -31,11 +31,8 @@ _EXAMPLE = '{side = "left", kind = "strike", time = 1.23}'
 def legal_events(given: Sequence[Mapping[str, float | str]] | None) -> tuple[FootEvent, ...]:
     """Return the events that a list of ``{side, kind, time}`` says, in the order of time; ``kind`` strike or off.
 
-    Raises
-    ------
-    SessionRefused
-        A key is missing or unknown, a value is not legal, or a foot strikes twice without an off between (or leaves
-        twice without a strike).
+    SessionRefused: a key is missing or unknown, a value is not legal, or a foot strikes twice without an off between
+    (or leaves twice without a strike).
     """
     found = sorted((_event(one) for one in given or ()), key=lambda one: one.time)
     for side in SIDES:
@@ -65,10 +62,7 @@ def _event(given: Mapping[str, float | str]) -> FootEvent:
 def with_events(trial: Trial, events: tuple[FootEvent, ...]) -> Trial:
     """Return a trial with the ``events`` that session.toml says; the history names their sides.
 
-    Raises
-    ------
-    TrialRefused
-        One is not within the trial.
+    TrialRefused: one is not within the trial.
     """
     clocks = [trial.markers.time] if trial.markers is not None else []
     clocks += [plate.wrench.time for plate in trial.plates]
@@ -109,10 +103,7 @@ class Exchange:
 def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exchange, ...]:
     """Return the exchanges that a list of ``[label, label]`` or ``[label, label, from s, to s]`` says.
 
-    Raises
-    ------
-    SessionRefused
-        An entry is none of the two, names one label twice, or ends before it begins.
+    SessionRefused: an entry is none of the two, names one label twice, or ends before it begins.
     """
     found = []
     for entry in given or ():
@@ -130,10 +121,7 @@ def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exch
 def legal_spans(given: Sequence[Sequence[float | str]] | None) -> tuple[LeftOutSpan, ...]:
     """Return the spans that a list of ``[from s, to s]`` or ``[from s, to s, side]`` says, in the order of time.
 
-    Raises
-    ------
-    SessionRefused
-        An entry is none of the two, or ends before it begins.
+    SessionRefused: an entry is none of the two, or ends before it begins.
     """
     found = []
     for entry in given or ():
@@ -233,10 +221,7 @@ _HEAVIEST = 30.0
 def legal_prosthesis(segment: str | None) -> str:
     """Return the segment that a prosthesis begins with, "" for None.
 
-    Raises
-    ------
-    SessionRefused
-        It is no segment of an arm or leg; the message lists them.
+    SessionRefused: it is no segment of an arm or leg; the message lists them.
     """
     if segment and segment not in _LIMBS:
         told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", segment, _LIMBS)
@@ -247,10 +232,7 @@ def legal_prosthesis(segment: str | None) -> str:
 def legal_devices(given: Mapping[str, float]) -> dict[str, float]:
     """Return what is worn, kg by segment.
 
-    Raises
-    ------
-    SessionRefused
-        There is no such segment, or the mass is none of a device.
+    SessionRefused: there is no such segment, or the mass is none of a device.
     """
     for segment, mass in given.items():
         if segment not in MARKED_SEGMENTS:
@@ -282,10 +264,7 @@ class PlateEntry(BaseModel):
 def told_plate(name: str, entry: PlateEntry) -> ToldPlate:
     """Return what a table ``[plates.NAME]`` says.
 
-    Raises
-    ------
-    SessionRefused
-        There is no such plate, or a value is not legal; the message says what would be.
+    SessionRefused: there is no such plate, or a value is not legal; the message says what would be.
     """
     if not re.fullmatch(r"plate[1-9]\d?", name):
         raise SessionRefused(f"[plates.{name}] is no plate. Legal names are plate1, plate2 ..., as inspect shows them.")
