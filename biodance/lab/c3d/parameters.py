@@ -143,7 +143,9 @@ def read_parameters(content: bytes, header: Header, where: str) -> tuple[Paramet
 
 def _left_out(known: dict[str, ParameterValue], group: str, name: str, values: list[ParameterValue], where: str) -> str:
     """Settle in its group, which is ``known``, a parameter with several ``values``; return the sentence about it."""
-    twice = f"parameter {group}:{name} is there twice, as {' and as '.join(map(_short, values))}"
+    listed = [value if isinstance(value, list) else np.ravel(value, order="F") for value in values]
+    short = (", ".join(str(one) for one in some[:4]) for some in listed)
+    twice = f"parameter {group}:{name} is there twice, as {' and as '.join(short)}"
     if name.rstrip("0123456789") in _NEEDED.get(group, ()):
         raise FileRefused(
             f"{where}: {twice}, and the file cannot be read without it. Delete the wrong one, for example in Mokka or "
@@ -161,10 +163,6 @@ def _same(one: ParameterValue, other: ParameterValue) -> bool:
     if isinstance(one, list) or isinstance(other, list):
         return isinstance(one, list) and isinstance(other, list) and one == other
     return one.dtype.kind == other.dtype.kind and np.array_equal(one, other)
-
-
-def _short(value: ParameterValue) -> str:
-    return ", ".join(str(one) for one in (value if isinstance(value, list) else np.ravel(value, order="F"))[:4])
 
 
 def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, int]]:

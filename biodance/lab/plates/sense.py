@@ -351,13 +351,10 @@ def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, s
     if sway:
         contrary = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
         return f"{contrary}.", f"{contrary}. Check the cabling and the corner order."
-    return _upwards_said(reading.plate.type) if sign and reading.axes[2, 2] > 0 else ("", "")
-
-
-def _upwards_said(kind: int) -> tuple[str, str]:
-    """Say that a plate's z points up, and doubt it where the maker's own axes have z down (eight channels)."""
+    if not sign or reading.axes[2, 2] <= 0:
+        return "", ""
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
-    if kind not in (3, 7):
+    if reading.plate.type not in (3, 7):
         return f"{said}.", ""
     doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order."
     return doubt, doubt

@@ -63,7 +63,9 @@ def beside(path: Path) -> Path | None:
 
     It has the stem of the markers with a usual ending, else it is the only one whose stem goes on behind theirs.
     """
-    places = (path.parent, *_places_of_forces(path.parent))
+    folder = path.parent
+    beside_it = sorted(folder.parent.iterdir()) if _MARKER_FOLDER.search(folder.name) else []
+    places = (folder, *(one for one in beside_it if one.is_dir() and _FORCE_FOLDER.search(one.name)))
     for place in places:
         for ending, suffix in product(_FORCES_BESIDE, _TABLES):
             candidate = place / f"{path.stem}{ending}{suffix}"
@@ -91,13 +93,6 @@ def _going_on(markers: Path, place: Path) -> list[Path]:
     tables = [path for path in sorted(place.iterdir()) if path.suffix.lower() in _TABLES and path.is_file()]
     own = [table for table in tables if fits(markers.stem, table) and table.stem != markers.stem]
     return [table for table in own if not any(len(s) > len(markers.stem) and fits(s, table) for s in stems)]
-
-
-def _places_of_forces(markers: Path) -> list[Path]:
-    """Return the folders for forces beside a folder for markers; none where the folder is no such one."""
-    if not _MARKER_FOLDER.search(markers.name):
-        return []
-    return [path for path in sorted(markers.parent.iterdir()) if path.is_dir() and _FORCE_FOLDER.search(path.name)]
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:
@@ -152,14 +147,16 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     (time, xyz), timing = _equal_steps(tuple(names), numbers, raw_time, seen, _rate(header, path), path)
     warnings += timing
     history = [*[COMMAS_READ] * commas, *short, f"Coordinates were read in {unit} and turned into m.", *unseen]
-    if _is_z_up(Markers(tuple(names), time, xyz)):
+    # by the labels of high and low markers, else by where the cloud is tall
+    up, known = axis_to_head(Markers(tuple(names), time, xyz), recognise(names)), recognise(names)
+    if body_is_tall_along_z(xyz) if up is None or up[0] else bool(up[2]):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
         )
     else:
         xyz = xyz @ Y_UP_TO_Z_UP.T
         history.append("The file is y up (OpenSim): turned by 90 degrees about x to z up.")
-    markers, known = Markers(tuple(names), time, xyz), recognise(names)
+    markers = Markers(tuple(names), time, xyz)
     source = Source(path, sha256(content), "TRC", rate=markers.rate, first_frame=int(numbers[0]))
     worn = known.name if known else ""
     return Trial(path.stem, role, markers, (), source, worn, history=tuple(history), warnings=tuple(warnings))
@@ -318,9 +315,3 @@ def _equal_steps(
     if len(full) > raw.size:
         warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
     return (raw[0] + np.arange(len(full)) / rate, full), warnings
-
-
-def _is_z_up(markers: Markers) -> bool:
-    """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
-    axis = axis_to_head(markers, recognise(markers.names))
-    return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])

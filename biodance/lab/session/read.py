@@ -36,6 +36,8 @@ from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
 from biodance.threads import one_thread
 
+_INVALID = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
+
 
 def visit_words(folder: Path, trials: Iterable[str]) -> Mapping[str, str]:
     """Return ``date`` (ISO 8601), ``lab``, ``operator`` and ``condition`` of a session, each "" where nobody says.
@@ -140,9 +142,10 @@ def read_session(
                 file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
             )
             labels.update(trial.markers.names if trial.markers is not None else ())
-            trial = with_parts_corrected(
-                _with_strikes(replace(trial, settings=chosen), operator), file_says.parts(file.stem)
-            )
+            states = operator.plates.items() if operator else ()
+            struck = (f"The operator marked {one} {_INVALID}" for one, state in states if state.lower() == "invalid")
+            trial = replace(trial, settings=chosen, warnings=(*trial.warnings, *struck))
+            trial = with_parts_corrected(trial, file_says.parts(file.stem))
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
@@ -193,13 +196,6 @@ def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNote
     if file.parent != folder and (role := role_by_name(file.parent.name)):
         return role, f"guessed from its folder {file.parent.name}"
     return "fit", "a movement: its name says no other role"
-
-
-def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
-    """Return the trial with a warning for every plate that the operator marked as invalid in Eclipse."""
-    invalid = [plate for plate, state in (operator.plates if operator else {}).items() if state.lower() == "invalid"]
-    why = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
-    return replace(trial, warnings=(*trial.warnings, *(f"The operator marked {plate} {why}" for plate in invalid)))
 
 
 def _settle_static(

@@ -192,7 +192,10 @@ def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[
     trials = _without_companions([*files, *more], readers)
     for file in sorted(trials, key=lambda f: (order.index(f.suffix.lower()), not _beside(f, readers), str(f))):
         trial = (file.parent, file.stem.lower())
-        twin = next((one for one in kept.values() if one.name == file.name and _same_bytes(one, file)), None)
+        # ordinary files only: a pipe is not opened, and a broken link is left to its reader
+        alike = [one for one in kept.values() if one.name == file.name and one.is_file() and file.is_file()]
+        alike = [one for one in alike if one.stat().st_size == file.stat().st_size]
+        twin = next((one for one in alike if filecmp.cmp(one, file, shallow=False)), None)
         if trial in kept:
             notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
         elif twin is not None:
@@ -238,12 +241,6 @@ def _sessions_of_their_own(parts: Mapping[Path, list[Path]], own: list[Path], *,
 
 def _holds_any(folder: Path, names: Iterable[str]) -> bool:
     return any((folder / name).is_file() for name in names)
-
-
-def _same_bytes(one: Path, other: Path) -> bool:
-    """Return whether two ordinary files are alike; a pipe is not opened, and a broken link is left to its reader."""
-    ordinary = one.is_file() and other.is_file()
-    return ordinary and one.stat().st_size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:

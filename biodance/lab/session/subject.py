@@ -163,7 +163,9 @@ def identify_subject(
     masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
     mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
-    sex = typed.sex or _declared_sex(sources)
+    told = next((one.value for one in _declared(sources, _SEX_NAMES, (0.0, 1.0)) if one.value in (0.0, 1.0)), None)
+    declared: Literal["F", "M"] | None = None if told is None else "M" if told else "F"  # files hold it as 0 or 1
+    sex = typed.sex or declared
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
     on_plates = [_Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
@@ -295,14 +297,6 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
         f"over the ankles of {told_by} while the person is upright in {name}: no static trial tells it."
     )
     return stature
-
-
-def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
-    """Return the sex where a file holds it as a number, 0 for a woman and 1 for a man; None otherwise."""
-    for declared in _declared(sources, _SEX_NAMES, (0.0, 1.0)):
-        if declared.value in (0.0, 1.0):
-            return "M" if declared.value else "F"
-    return None
 
 
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
