@@ -105,18 +105,11 @@ class _Geometry(NamedTuple):
     origin_said: tuple[str, ...]
 
 
-class _DecodedPlates(NamedTuple):
-    """The ``readings`` of a file's plates, why others are ``refused`` by number, and ``warnings``."""
-
-    readings: list[PlateReading]
-    refused: dict[int, str]
-    warnings: tuple[str, ...]
-
-
 def decode_plates(
     raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
-) -> _DecodedPlates:
-    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
+) -> tuple[list[PlateReading], dict[int, str], tuple[str, ...]]:
+    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already; by number why
+    others are refused; and warnings.
 
     Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
     not applied where with it the plates carry less than half or more than twice the weight, and without it, within
@@ -129,22 +122,22 @@ def decode_plates(
     done, lost = _decode_each(raw, plates, metres, turn)
     used = [column for reading in done for column in reading.plate.channels]
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
     if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
     plain, lost_plain = _decode_each(stored, plates, metres, turn)
     whole = _weight_share(plain, mass)
     if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     said = (
         f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
         f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
         f"ANALOG:SCALE, or export the file again."
     )
-    return _DecodedPlates(plain, lost_plain, (said,))
+    return plain, lost_plain, (said,)
 
 
 def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:

@@ -47,13 +47,9 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
     """Return the trial of a table with plate columns: plates, no markers."""
     table = read_mot(path)
     plates, said, doubts = plates_of(table, where=str(path))
-    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=plates_rate(plates))
+    rate = plates[0].wrench.rate if plates else math.nan
+    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=rate)
     return Trial(path.stem, role, None, plates, source, history=said, warnings=(*table.warnings, *doubts))
-
-
-def plates_rate(plates: tuple[Plate, ...]) -> float:
-    """Return the rate (Hz) of plates; NaN without one."""
-    return plates[0].wrench.rate if plates else math.nan
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """OpenSim's table of markers, with the forces in a table of the same stem beside it."""
 
+import math
 import re
 from dataclasses import replace
 from itertools import product
@@ -23,9 +24,9 @@ from biodance.lab.plain_text import (
     with_points,
     write_whole,
 )
-from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, columns_of, read_mot
+from biodance.lab.program_tables import Y_UP_TO_Z_UP, columns_of, read_mot
 from biodance.lab.readers import head_text
-from biodance.lab.readers.mot import has_plates, plates_of, plates_rate
+from biodance.lab.readers.mot import has_plates, plates_of
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -103,21 +104,17 @@ def _with_forces(trial: Trial, path: Path) -> Trial:
     except FileRefused as error:
         return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
     digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
-    source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates))
+    rate = plates[0].wrench.rate if plates else math.nan
+    source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=rate)
     history = tuple(dict.fromkeys((*trial.history, f"Forces were read from {path.name} beside it.", *said)))
-    warnings = (*trial.warnings, *table.warnings, *doubts, *_out_of_step(trial, table))
-    return replace(trial, plates=plates, source=source, history=history, warnings=warnings)
-
-
-def _out_of_step(trial: Trial, table: TimeTable) -> list[str]:
-    """Return a warning if markers and forces do not cover the same time."""
+    warnings = [*trial.warnings, *table.warnings, *doubts]
     assert trial.markers is not None  # a .trc file always holds markers
     time = trial.markers.time
     overlap = min(time[-1], table.time[-1]) - max(time[0], table.time[0])
-    if overlap >= 0.9 * (time[-1] - time[0]):
-        return []
-    span = f"{time[0]:g} to {time[-1]:g} s, the forces {table.time[0]:g} to {table.time[-1]:g} s"
-    return [f"The markers cover {span}: they may not belong together."]
+    if overlap < 0.9 * (time[-1] - time[0]):
+        span = f"{time[0]:g} to {time[-1]:g} s, the forces {table.time[0]:g} to {table.time[-1]:g} s"
+        warnings.append(f"The markers cover {span}: they may not belong together.")
+    return replace(trial, plates=plates, source=source, history=history, warnings=tuple(warnings))
 
 
 def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:

@@ -68,7 +68,10 @@ def read_index(path: Path) -> tuple[IndexedTrial, ...]:
     for cells_of_row in filter(any, rows):
         row = dict(zip(names, (cell.strip() for cell in cells_of_row), strict=False))
         trial, person, said, mass, visit = (row.get(column[kind], "") for kind in _COLUMNS)
-        recording = _recording(path.parent, trial)
+        # with or without its extension, and never outside the folder
+        names_file = bool(trial) and Path(trial).name == trial
+        files = [path.parent / f"{trial}{ending}" for ending in ("", *extensions())] if names_file else []
+        recording = next(filter(Path.is_file, files), None)
         if recording is not None:
             visit = visit or " ".join(filter(None, (person, said[:16])))
             trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
@@ -89,13 +92,6 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return float("nan")
-
-
-def _recording(folder: Path, name: str) -> Path | None:
-    """Return the recording that a table calls ``name``, with or without its extension; None if it is not there."""
-    if not name or Path(name).name != name:
-        return None
-    return next((path for ending in ("", *extensions()) if (path := folder / f"{name}{ending}").is_file()), None)
 
 
 def _conditions(trials: list[tuple[IndexedTrial, dict[str, str]]], names: list[str]) -> list[str]:
