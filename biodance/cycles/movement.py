@@ -45,7 +45,7 @@ from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, FootEvent, Motion, Sip, Trial
+from biodance.records import Array, FootEvent, Mask, Motion, Sip, Trial
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -61,34 +61,17 @@ _WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class TrialMovement:
-    """What moved in one trial.
+    """What moved in one ``trial`` (its name).
 
-    Parameters
-    ----------
-    trial : str
-        Its name.
-    events : tuple of FootEvent
-        Strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where they saw
-        one, else of the markers.
-    cycles : tuple of Cycle
-        Gait cycles of each foot, squats, rises from a chair, jumps.
-    curves : tuple of CycleCurve
-        Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
-        uncertain in them; pelvis, foot progression and centre of mass; envelopes of EMG channels (mV).
-    strides : tuple of Stride
-        Spatio-temporal values of every gait cycle.
-    late : tuple
-        (n,) s arrays for strikes and leavings: how much later the markers tell them than the plates.
-    file_angles, file_events : tuple
-        Ours beside those that another program wrote into the same file.
-    file_curves : tuple of CycleCurve
-        Plug-in gait's own angles over the gait cycles.
-    lifts : tuple of Stride
-        Depth, height, force share of the feet and rise of the force of every squat, rise and jump.
-    shared : tuple of Cycle
-        Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
-    notes : tuple of str
-        What a person should know.
+    ``events`` strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where
+    they saw one, else of the markers; ``cycles`` of each foot, squats, rises from a chair, jumps; ``curves`` of every
+    cycle over 0 to 100 %: angles (deg), moments (N·m/kg) and powers (W/kg) with what the parameters leave uncertain in
+    them, pelvis, foot progression and centre of mass, envelopes of EMG channels (mV); ``strides`` spatio-temporal
+    values of every gait cycle; ``late`` (n,) s for strikes and for leavings: how much later the markers tell them than
+    the plates; ``file_angles``, ``file_events`` ours beside those that another program wrote into the same file;
+    ``file_curves`` plug-in gait's own angles over the gait cycles; ``lifts`` depth, height, force share of the feet and
+    rise of the force of every squat, rise and jump; ``shared`` gait cycles in which both feet stood on one plate (there
+    the loads of the leg are not known); ``notes`` what a person should know.
 
     Examples
     --------
@@ -227,15 +210,12 @@ def trial_movement(
     if motion.time.size < 3:
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
-    markers, force = kinematic_events(body, motion), tuple[FootEvent, ...]()
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
-    if contact is not None and feet is not None:
-        force = foot_events(feet, contact)
+    force = foot_events(feet, contact) if contact is not None and feet is not None else ()
+    markers = kinematic_events(body, motion)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    nowhere = np.zeros(motion.time.size, dtype=bool)
-    shared = nowhere if contact is None else np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
-    known_of_feet = np.stack([nowhere, nowhere], axis=1) if contact is None else contact.told
+    known_of_feet, shared = _known_feet(contact, motion.time.size)
     jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
     lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*gait_cycles(trial.name, events), *lifts, *jumped)
@@ -249,9 +229,9 @@ def trial_movement(
         curves += own
         theirs += file_curves(cycle, outputs, motion.time, own)
         curves += emg_curves(cycle, outputs)
-        if contact is not None and feet is not None:
+        if feet is not None:
             # in gait the force under a foot does not count while both are on one plate
-            known = contact.told & ~shared[:, None] if cycle.kind == "gait" else contact.told
+            known = known_of_feet & ~shared[:, None] if cycle.kind == "gait" else known_of_feet
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
             curves += ground_curves(cycle, body, motion, soles, feet, known)
     return TrialMovement(
@@ -268,6 +248,15 @@ def trial_movement(
         tuple(one for one in on_one if one.kind == "gait"),
         _notes(cycles, on_one, contact),
     )
+
+
+def _known_feet(contact: Contact | None, frames: int) -> tuple[Mask, Mask]:
+    """Return (T, 2) where the plates tell the force under each foot, nowhere without plates; and (T,) where both feet
+    are on one plate.
+    """
+    if contact is None:
+        return np.zeros((frames, 2), dtype=bool), np.zeros(frames, dtype=bool)
+    return contact.told, np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
 
 
 def _notes(cycles: Sequence[Cycle], on_one: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:

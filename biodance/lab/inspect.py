@@ -12,7 +12,7 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
-from biodance.lab.markers.signals import MarkerGaps, report_gaps
+from biodance.lab.markers.signals import report_gaps
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.corners import Told
 from biodance.lab.readers import read_trial, reader_of
@@ -98,14 +98,8 @@ def inspect_file(
     except BiodanceError as error:
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)
-    markers_of_set, gaps = trial.markers, tuple[MarkerGaps, ...]()
-    if markers_of_set is not None:  # all of them where no set was recognised
-        set_ = read_marker_set(trial.marker_set) if trial.marker_set else None
-        gaps = report_gaps(canonical(markers_of_set, set_) if set_ else markers_of_set)
-    never = [gap.label for gap in gaps if gap.percent >= 100.0]
-    hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
-    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed]
-    warnings += [f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}."] if never else []
+    gap, never = _gaps(trial)
+    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed, *never]
     plates = [_plate(plate) for plate in trial.plates]
     clocks = [*([trial.markers.time] if trial.markers else ()), *(plate.wrench.time for plate in trial.plates)]
     as_read = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]
@@ -121,7 +115,7 @@ def inspect_file(
         "markers": list(trial.markers.names) if trial.markers is not None else [],
         "marker_set": trial.worn or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
-        "gaps_percent": float(np.mean(hidden)) if hidden else None,
+        "gaps_percent": gap,
         "subjects": _subjects(path),
         "plates": plates,
         "mean_vertical_n": float(sum(as_read)) if as_read else None,
@@ -131,6 +125,20 @@ def inspect_file(
         "history": list(trial.history),
         "warnings": warnings,
     }
+
+
+def _gaps(trial: Trial) -> tuple[float | None, list[str]]:
+    """Return the mean share of gaps, per cent, of the set's markers (of all, without a set) that were seen at all, None
+    without one; and a sentence about those that never were.
+    """
+    if trial.markers is None:
+        return None, []
+    worn = read_marker_set(trial.marker_set) if trial.marker_set else None
+    gaps = report_gaps(canonical(trial.markers, worn) if worn else trial.markers)
+    hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
+    never = [gap.label for gap in gaps if gap.percent >= 100.0]
+    said = [f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}."] if never else []
+    return float(np.mean(hidden)) if hidden else None, said
 
 
 def _guessed(trial: Trial) -> tuple[Trial, list[str]]:

@@ -52,15 +52,16 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
         for name in given.values()
         if not name[-2:-1].isdigit() and any({name[:-1] + end for end in ends} <= set(given.values()) for ends in _AXES)
     }
-    axes = {label for label, name in given.items() if name[:-1] in bones and name[-1:] in "0123OALP"}
-    none = {label for label, name in given.items() if not name or _UNLABELLED.match(name) or _COMPUTED.search(name)}
-    given = {label: name for label, name in given.items() if label not in axes | none}
+    given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
     given = {label: name.removeprefix(shared) or name for label, name in given.items()}
-    # the last word after a separator (_study, _pt) that nearly all names end with
-    ends = Counter(found[0] for name in given.values() if (found := re.search(r"(?<=.)[\W_][^\W\d_]+$", name)))
-    ending = next((end for end, times in ends.items() if times >= max(_SHARED * len(given), 4)), "")
+    ending = _ending(list(given.values()))
     return {label: name.removesuffix(ending) or name for label, name in given.items()}
+
+
+def _is_no_marker(name: str, bones: set[str]) -> bool:
+    """Return whether a label names no marker: an unlabelled point, one that software computes, an axis of a bone."""
+    return bool(_UNLABELLED.match(name) or _COMPUTED.search(name)) or (name[:-1] in bones and name[-1:] in "0123OALP")
 
 
 def _beginning(names: Sequence[str]) -> str:
@@ -70,6 +71,13 @@ def _beginning(names: Sequence[str]) -> str:
     capital = sum(name[1:2].isupper() for name in names) >= _SHARED * len(names)
     end = re.compile(r".*(.[\W_]|\d\d)|\D{3,}" + ("|[a-z]" if capital else ""), re.DOTALL)
     return max((start for start in often if end.fullmatch(start)), key=len, default="")
+
+
+def _ending(names: Sequence[str]) -> str:
+    """Return the last word after a separator (_study, _pt) that nearly all names end with."""
+    ends = Counter(found[0] for name in names if (found := re.search(r"(?<=.)[\W_][^\W\d_]+$", name)))
+    often = [end for end, times in ends.items() if times >= max(_SHARED * len(names), 4)]
+    return often[0] if often else ""
 
 
 def _tokens_of(label: str) -> tuple[str, ...]:

@@ -230,6 +230,19 @@ class Standing:
         return reach is None or shoulder == label or bool(reach[0] <= away <= reach[1])
 
 
+def _from_left_to_right(known: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the vectors (3,) m from the left to the right landmark of each pair of which both are known."""
+    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
+    return {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+
+
+def _stature(known: Mapping[str, Array], floor: float) -> float:
+    """Return the stature, m, that the usual heights of landmarks above the ankle tell (median); 0 without one."""
+    usual = [(place[2], _height_of(name)) for name, place in known.items()]
+    statures = [(high - floor) / pair[0] for high, pair in usual if pair and pair[0] > 0.2]
+    return float(np.median(statures)) if statures else 0.0
+
+
 def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Standing | str | None:
     """Return the standing person that labelled points show, a sentence if nobody stands so, None if the names are too
     few.
@@ -237,9 +250,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     ``at`` label -> (3,) m, z up; ``named`` landmark -> label.
     """
     known = {place: at[label] for place, label in named.items()}
-    # The vectors (3,) m from the left to the right landmark of each pair of which both are known.
-    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
-    pairs = {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
+    pairs = _from_left_to_right(known)
     ends = [(f"{side}_{front}", back.format(side)) for side in SIDES for front, back in _FRONT_AND_BACK]
     ahead = [known[front] - known[back] for front, back in ends if known.keys() >= {front, back}]
     if len(pairs) < 3 or not ahead:
@@ -257,10 +268,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
         return "Of some pairs of markers the right one lies left of the left one: the sides are exchanged in part."
     feet = [place[2] for name, place in known.items() if name.endswith(_FEET)]
     floor = float(min(feet or (at[label][2] for label in plain_labels(at)))) - 0.02
-    # The stature, m, that the usual heights of landmarks above the ankle tell (median); 0 without one.
-    usual = [(place[2], _height_of(name)) for name, place in known.items()]
-    statures = [(high - floor) / pair[0] for high, pair in usual if pair and pair[0] > 0.2]
-    stature = float(np.median(statures)) if statures else 0.0
+    stature = _stature(known, floor)
     if not 0.6 < stature < 2.6:
         return f"Nobody stands upright here: the labels would make a person of {stature:.2f} m."
     return Standing(at, named, right, forward, _middle(known, pairs, forward, stature), floor, stature)

@@ -36,8 +36,6 @@ from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
 from biodance.threads import one_thread
 
-_INVALID = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
-
 
 def visit_words(folder: Path, trials: Iterable[str]) -> Mapping[str, str]:
     """Return ``date`` (ISO 8601), ``lab``, ``operator`` and ``condition`` of a session, each "" where nobody says.
@@ -142,9 +140,7 @@ def read_session(
                 file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
             )
             labels.update(trial.markers.names if trial.markers is not None else ())
-            states = operator.plates.items() if operator else ()
-            struck = (f"The operator marked {one} {_INVALID}" for one, state in states if state.lower() == "invalid")
-            trial = replace(trial, settings=chosen, warnings=(*trial.warnings, *struck))
+            trial = replace(trial, settings=chosen, warnings=(*trial.warnings, *_invalid_strikes(operator)))
             trial = with_parts_corrected(trial, file_says.parts(file.stem))
         except BiodanceError as error:
             refused[file.name] = str(error)
@@ -196,6 +192,13 @@ def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNote
     if file.parent != folder and (role := role_by_name(file.parent.name)):
         return role, f"guessed from its folder {file.parent.name}"
     return "fit", "a movement: its name says no other role"
+
+
+def _invalid_strikes(operator: EclipseNotes | None) -> list[str]:
+    """Return a warning for every plate that the operator marked as invalid in Eclipse."""
+    why = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
+    states = operator.plates.items() if operator else ()
+    return [f"The operator marked {plate} {why}" for plate, state in states if state.lower() == "invalid"]
 
 
 def _settle_static(
