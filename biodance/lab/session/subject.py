@@ -69,6 +69,7 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
         return math.nan, math.nan, ""
     sds = np.array(spread)
     weight = sds**-2 / (sds**-2).sum()
+    # the sd of the mean has the correlation of the landmarks in it, though the weights have not
     covariance = np.outer(sds, sds) * (_ALIKE + (1 - _ALIKE) * np.eye(len(sds)))
     stature = float(weight @ told)
     return stature, stature * float(np.sqrt(weight @ covariance @ weight)), ", ".join(names)
