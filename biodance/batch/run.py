@@ -155,8 +155,12 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     """Yield every task with its outcome, worked on by the Dask cluster at the address ``scheduler``.
 
     Recordings and results must lie where all workers see them under the same names. Dask replaces workers that die.
-    BiodanceError: Dask is not installed, nobody answers at the address, the scheduler goes away, or it or a worker has
-    no biodance.
+
+    Raises
+    ------
+    BiodanceError
+        Dask is not installed, nobody answers at the address, the scheduler goes away, or it or a worker has no
+        biodance.
     """
     try:
         import distributed as dask
@@ -235,7 +239,10 @@ ON CONFLICT (name) DO UPDATE SET fingerprint = excluded.fingerprint, status = ex
 class Ledger:
     """The book of one archive's results, open for one run.
 
-    BiodanceError: the folder holds something else, the results of another archive, or another run is writing into it.
+    Raises
+    ------
+    BiodanceError
+        The folder holds something else, the results of another archive, or another run is writing into it.
     """
 
     def __init__(self, folder: Path, archive: Path) -> None:

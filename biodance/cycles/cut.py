@@ -75,7 +75,10 @@ _TOGETHER = 0.1  # s: events of force and of markers that are nearer than this a
 def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
     """Return strikes and leavings of both feet by the tracked body, in the order of time; () where nobody steps.
 
-    TrialRefused: the body has no two feet.
+    Raises
+    ------
+    TrialRefused
+        The body has no two feet.
     """
     outline, pose = soles_from_body(body, motion).outline, poses(body, motion.q)
     forward = pose.rotation[:, 0, :2, 0]

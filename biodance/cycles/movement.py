@@ -204,8 +204,12 @@ def trial_movement(
     """Return what moved in a prepared trial.
 
     ``sip`` what is known of the inertial parameters (by default the body's), ``contact`` with the plates (None: no
-    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file. TrialRefused:
-    the body has no two feet, or the trial less than three frames.
+    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file.
+
+    Raises
+    ------
+    TrialRefused
+        The body has no two feet, or the trial less than three frames.
     """
     if motion.time.size < 3:
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")

@@ -77,7 +77,10 @@ def normal_toml(bands: Sequence[NormalCurve], table: str = "normal") -> list[str
 def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...]:
     """Return the bands of ``[normal]``, read from a lab.toml.
 
-    KeyError, TypeError, ValueError: it is not what `normal_toml` writes.
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        It is not what `normal_toml` writes.
     """
     bands = []
     for name, row in raw.items():

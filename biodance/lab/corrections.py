@@ -120,7 +120,10 @@ def corrected_session(session: Session, corrections: tuple[PlateCorrection, ...]
 def read_corrections(path: str | Path) -> tuple[PlateCorrection, ...]:
     """Return what ``[corrections]`` of a lab.toml says, in its order; () where there is none.
 
-    FileRefused: the file cannot be read, is not TOML, or names a cause, a target or a value that cannot be corrected.
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is not TOML, or names a cause, a target or a value that cannot be corrected.
     """
     found = read_toml(Path(path)).get("corrections", {})
     if not isinstance(found, dict):

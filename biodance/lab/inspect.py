@@ -41,7 +41,12 @@ def inspect_paths(
 
     ``subject`` chooses the person in C3D files that hold several; ``markers`` is the name or file of the marker set
     that was worn; without it, what the session.toml of a file's folder says of it, else the known set that fits, else
-    what can be guessed. BiodanceError: no path is given.
+    what can be guessed.
+
+    Raises
+    ------
+    BiodanceError
+        No path is given.
     """
     if not paths:
         raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")

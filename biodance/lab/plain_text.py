@@ -25,7 +25,10 @@ _PRESENT = "{}: exists already and is not overwritten. Choose another name or re
 def read_bytes(path: Path) -> bytes:
     """Return the bytes of a file.
 
-    FileRefused: there is no such file, it is a pipe or device or too large, it cannot be opened, or it is empty.
+    Raises
+    ------
+    FileRefused
+        There is no such file, it is a pipe or device or too large, it cannot be opened, or it is empty.
     """
     refuse_special(path)
     refuse_huge(path)
@@ -45,7 +48,10 @@ def whole_file(path: Path, *, over: bool = False) -> Iterator[Path]:
     """Yield a path beside ``path``, of the same ending, to write to; what was written is flushed to the disk and takes
     its name in one step. What fails or is stopped leaves ``path`` as it was; a file there is replaced only ``over`` it.
 
-    FileRefused: the file exists and not ``over``, or cannot be written.
+    Raises
+    ------
+    FileRefused
+        The file exists and not ``over``, or cannot be written.
     """
     part = path.with_name(f".part-{uuid.uuid4().hex}{path.suffix}")
     try:
@@ -128,7 +134,12 @@ def decode(content: bytes, path: Path) -> str:
     """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a
     meaning, so it comes last).
 
-    All line ends become the Unix one. FileRefused: the bytes are not text.
+    All line ends become the Unix one.
+
+    Raises
+    ------
+    FileRefused
+        The bytes are not text.
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = content.decode("utf-16", errors="replace")
@@ -174,8 +185,11 @@ def cells(line: str) -> list[str]:
 def parse_number(cell: str, where: str) -> float:
     """Return the number in a cell; an empty cell, nan and inf are NaN: not known.
 
-    FileRefused: it is no number, or larger than any that is recorded: says ``where``. Python's own 1_0 and digits of
-    other scripts are none.
+    Raises
+    ------
+    FileRefused
+        It is no number, or larger than any that is recorded: says ``where``. Python's own 1_0 and digits of other
+        scripts are none.
     """
     if not cell:
         return math.nan

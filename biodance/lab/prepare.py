@@ -95,8 +95,12 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
 
     ``rate`` in Hz. Every column is filtered from gap to gap, never across one; a run shorter than
     ``settings.shortest(rate)`` samples is returned as it is (``left_raw`` tells which). The ends are continued by point
-    reflection over one period of the cut-off. BiodanceError: the rate or the cut-off is not legal, or the whole signal
-    is shorter than the shortest run.
+    reflection over one period of the cut-off.
+
+    Raises
+    ------
+    BiodanceError
+        The rate or the cut-off is not legal, or the whole signal is shorter than the shortest run.
     """
     sections = _design_low_pass(settings, rate)
     values = np.asarray(values, dtype=float)
@@ -139,8 +143,12 @@ def prepare(trial: Trial) -> Trial:
 
     ``trial.settings`` say how forces are filtered and up to which length gaps are bridged by a spline. Without markers
     the plates keep their own times; markers outside the plates' time are cut off. Every step is a sentence in
-    ``history``. A trial that was prepared already is returned as it is. TrialRefused: the cut-off is not below half the
-    marker or analog rate, or markers and plates share no time.
+    ``history``. A trial that was prepared already is returned as it is.
+
+    Raises
+    ------
+    TrialRefused
+        The cut-off is not below half the marker or analog rate, or markers and plates share no time.
     """
     if _PREPARED in trial.history:
         return trial

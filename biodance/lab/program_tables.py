@@ -61,8 +61,11 @@ class TimeTable:
 def read_mot(path: str | Path) -> TimeTable:
     """Return the table of a .mot or .sto file. Time may have unequal steps; cells that hold ``nan`` stay NaN.
 
-    FileRefused: no ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, or several of
-    which there are not three, a time that does not increase.
+    Raises
+    ------
+    FileRefused
+        No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, or several of which
+        there are not three, a time that does not increase.
     """
     path = Path(path)
     parts = _parts(path)
@@ -92,8 +95,12 @@ def write_mot(path: str | Path, table: TimeTable, *, notes: tuple[str, ...] = ()
     """Write a table as .mot or .sto (version 1, tabs, nine significant digits), ``notes`` in its header; return the
     path.
 
-    FileRefused: the file exists (nothing is overwritten). TrialRefused: a value is NaN or infinite: OpenSim's splines
-    break on it. The message names column and time.
+    Raises
+    ------
+    FileRefused
+        The file exists (nothing is overwritten).
+    TrialRefused
+        A value is NaN or infinite: OpenSim's splines break on it. The message names column and time.
     """
     path = Path(path)
     if not np.isfinite(table.values).all():
@@ -297,7 +304,10 @@ def _cell(value: object) -> str:
 def write_motion(folder: Path, stem: str, channels: BidsChannels, *, task: str, about: Mapping[str, Any]) -> None:
     """Write ``stem_motion.tsv``, ``_channels.tsv``, ``_channels.json`` and ``_motion.json`` into a folder that exists.
 
-    FileRefused: a file exists or cannot be written.
+    Raises
+    ------
+    FileRefused
+        A file exists or cannot be written.
     """
     lines = ("\t".join("n/a" if np.isnan(v) else f"{v:.7g}" for v in row) for row in channels.values)
     write_whole(folder / f"{stem}_motion.tsv", ("\n".join(lines) + "\n").encode())

@@ -31,8 +31,11 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     """Return all joints of a table, whatever robot they belong to.
 
     A unit in the heading or below it, ``left_knee (deg)``, counts before ``unit`` ("rad", "deg" or "": rad).
-    FileRefused: it is no table (`read_cells`), no column is time, a number is missing, time does not increase or has a
-    gap.
+
+    Raises
+    ------
+    FileRefused
+        It is no table (`read_cells`), no column is time, a number is missing, time does not increase or has a gap.
     """
     cells = read_cells(read_bytes(path), path, least=2)
     values, names = cells.values, cells.labels
@@ -92,8 +95,12 @@ def for_joints(
 ) -> Encoders:
     """Return the encoders of a robot's ``joints`` in their order; ``fixed`` those without encoder, rad.
 
-    ``limits`` lower and upper (n,) rad of the joints. FileRefused: an encoder is missing, or shows what the joint
-    cannot do: degrees, another joint.
+    ``limits`` lower and upper (n,) rad of the joints.
+
+    Raises
+    ------
+    FileRefused
+        An encoder is missing, or shows what the joint cannot do: degrees, another joint.
     """
     missing = [name for name in joints if name not in found.joints and name not in fixed]
     if missing:
@@ -175,8 +182,12 @@ class RobotRecording:
 def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRecording:
     """Return what a folder holds of a robot with these ``joints`` (names of the URDF).
 
-    SessionRefused: there is no such folder, no table of encoders or no force plate file in it, or they do not pair.
-    FileRefused: a file cannot be trusted.
+    Raises
+    ------
+    SessionRefused
+        There is no such folder, no table of encoders or no force plate file in it, or they do not pair.
+    FileRefused
+        A file cannot be trusted.
     """
     folder = Path(folder)
     if not folder.is_dir():

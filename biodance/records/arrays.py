@@ -30,7 +30,10 @@ def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> 
     """Return a read-only float copy of ``value`` after checking its shape (``None`` = any length); ``value`` itself
     where it is one that a record froze before.
 
-    BiodanceError: the shape is wrong; the message names ``what``, the shape found and the shape expected.
+    Raises
+    ------
+    BiodanceError
+        The shape is wrong; the message names ``what``, the shape found and the shape expected.
     """
     array = value if _is_frozen(value) else np.array(value, dtype=float)
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))

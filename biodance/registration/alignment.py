@@ -106,7 +106,10 @@ class Forces:
 def forces_of(trial: Trial, settings: Settings) -> Forces:
     """Return the force recording of a trial, low-passed as the ``settings`` of the markers say.
 
-    TrialRefused: there is no plate, a sample is no number, or the plates have different times.
+    Raises
+    ------
+    TrialRefused
+        There is no plate, a sample is no number, or the plates have different times.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -128,7 +131,10 @@ def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose
     """Return a prepared trial with the plates in the room at the times of ``motion``, and the motion, both cut to the
     time that the force file knows.
 
-    TrialRefused: the two share no time.
+    Raises
+    ------
+    TrialRefused
+        The two share no time.
     """
     own = motion.time + pose.delay
     known = np.flatnonzero((own >= forces.time[0]) & (own <= forces.time[-1]))
@@ -202,8 +208,13 @@ class _Samples:
 def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -> tuple[Alignment, ...]:
     """Return the hypotheses, best first, each different from all before it.
 
-    ``needed`` (T, 6) N, N·m wrench that ``motion`` needs about the room's origin; ``floor`` m the height in the room on
-    which the feet stand. TrialRefused: the plates are never loaded, or not for long enough under any delay.
+    ``needed`` (T, 6) N, N·m wrench that ``motion`` needs about the room's origin; ``floor`` m the height in the room
+    on which the feet stand.
+
+    Raises
+    ------
+    TrialRefused
+        The plates are never loaded, or not for long enough under any delay.
     """
     height = floor - forces.height
     found = list(_scanned(motion, needed, forces, height))

@@ -164,7 +164,10 @@ def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: 
     """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about``
     (3,) m.
 
-    TrialRefused: no quarter of a second is fully measured and believable.
+    Raises
+    ------
+    TrialRefused
+        No quarter of a second is fully measured and believable.
     """
     known = replace(tolerances, sizes={key: size for key, size in tolerances.sizes.items() if key not in _SOUGHT})
     put = problem(body, (window,), shortest=_SHORTEST)
@@ -312,7 +315,10 @@ class Refined:
 def floor_of(soles: Soles) -> float:
     """Return the height m in the room on which the feet stand: the median lowest point of slow feet.
 
-    TrialRefused: no foot is ever slow.
+    Raises
+    ------
+    TrialRefused
+        No foot is ever slow.
     """
     slow = _slow(soles)
     if not slow.any():
@@ -356,7 +362,10 @@ def refined(
     """Return the pose that wrench and feet ask for, beginning at ``start``; ``tolerances`` of what is no fault in a
     look at the placed trial.
 
-    TrialRefused: neither the wrench nor the feet tell anything: no fully measured contact, no step.
+    Raises
+    ------
+    TrialRefused
+        Neither the wrench nor the feet tell anything: no fully measured contact, no step.
     """
     pose, why = start, ""
     weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)

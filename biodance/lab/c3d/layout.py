@@ -138,8 +138,11 @@ class Layout:
 def read_layout(content: bytes, header: Header, parameters: Parameters, where: str) -> Layout:
     """Return the layout of the data section of a file of these bytes.
 
-    FileRefused: the file is cut off, holds no data, or its header, parameters and length contradict each other without
-    a decision.
+    Raises
+    ------
+    FileRefused
+        The file is cut off, holds no data, or its header, parameters and length contradict each other without a
+        decision.
     """
     notes: list[str] = []
     scale = _agreed_scale(header, parameters, where)

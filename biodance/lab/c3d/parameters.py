@@ -78,7 +78,10 @@ def doubles(values: NDArray[Any]) -> NDArray[np.float64]:
 def read_header(content: bytes, where: str) -> Header:
     """Return the counts of the header.
 
-    FileRefused: the bytes are no C3D header, or point outside the file.
+    Raises
+    ------
+    FileRefused
+        The bytes are no C3D header, or point outside the file.
     """
     if not content:
         raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
@@ -119,9 +122,13 @@ def read_parameters(content: bytes, header: Header, where: str) -> tuple[Paramet
     one is zero, as what was never measured is, the other is kept.
 
     Text is a list of stripped strings; numbers are arrays with the dimensions of the file, first dimension fastest (so
-    that ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,). FileRefused: a record reaches
-    beyond the section, overlaps the next one or skips bytes: a damaged section cannot be trusted. A parameter that is
-    needed (counts, scales, labels, plates) stands there twice with different values.
+    that ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,).
+
+    Raises
+    ------
+    FileRefused
+        A record reaches beyond the section, overlaps the next one or skips bytes: a damaged section cannot be trusted.
+        A parameter that is needed (counts, scales, labels, plates) stands there twice with different values.
     """
     names: dict[int, str] = {}
     records: list[tuple[int, str, ParameterValue]] = []
@@ -169,7 +176,10 @@ def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, in
     """Return byte position and width of every label of a point: POINT:LABELS and its continuations LABELS2,
     LABELS3 ...
 
-    FileRefused: as `read_parameters`.
+    Raises
+    ------
+    FileRefused
+        As `read_parameters`.
     """
     records = list(_records(content, header, where))
     points = [number for _, number, name, value in records if value is None and name == "POINT"]

@@ -148,7 +148,11 @@ def metres_per_unit(
 
     ``points`` (T, K, 3) are the markers in file units. A missing or unknown unit, and one that would make the person or
     the plates smaller than 5 cm or larger than 4.75 m, is decided by sense among mm, cm and m, and said so.
-    FileRefused: the unit is missing and neither markers nor plates tell it.
+
+    Raises
+    ------
+    FileRefused
+        The unit is missing and neither markers nor plates tell it.
     """
     written = next(iter(texts(parameters, "POINT", "UNITS")), "")
     unit = _SPELLINGS.get(written.strip(" .").casefold(), "")
@@ -283,8 +287,10 @@ def read_raw(path: str | Path) -> RawC3d:
     """Read the bytes of a C3D file (Intel, DEC, SGI/MIPS; integer and float) without interpreting units, axes or
     plates.
 
-    FileRefused: the path is no readable file, no C3D file, or a C3D file that is damaged, cut off or contradicts
-    itself.
+    Raises
+    ------
+    FileRefused
+        The path is no readable file, no C3D file, or a C3D file that is damaged, cut off or contradicts itself.
     """
     path = Path(path)
     content, parameters, layout, history = open_c3d(path)
@@ -316,7 +322,10 @@ def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout, tuple[str, ...]]:
     """Return the bytes of a C3D file, its parameters, where its numbers lie, none of which is read yet, and what was
     decided about parameters that stand there twice.
 
-    FileRefused: as `read_raw`.
+    Raises
+    ------
+    FileRefused
+        As `read_raw`.
     """
     refuse_huge(path)
     try:

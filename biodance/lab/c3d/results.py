@@ -74,8 +74,13 @@ def write_results_c3d(
     Points, analog values and parameters of the original stay as they are. Positions are in the file's unit of length,
     angles, forces and moments in the units that POINT declares (without any: deg, N, N·m); ``BIODANCE:LABELS``,
     ``UNITS`` and ``COMPONENTS`` say of every output what it is, and ``parameters`` are added to that group. ``subject``
-    names the person where the file holds several. FileRefused: the original cannot be read, has other frames or has
-    such labels already; ezc3d cannot copy it; or ``path`` exists.
+    names the person where the file holds several.
+
+    Raises
+    ------
+    FileRefused
+        The original cannot be read, has other frames or has such labels already; ezc3d cannot copy it; or ``path``
+        exists.
     """
     path, original = Path(path), Path(original)
     refuse_present(path)
@@ -225,7 +230,11 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
     stop excluded; return the path. Every other byte is as in the recording.
 
     Where all frames are exchanged the labels change places (the subject's prefix stays), else the points do.
-    FileRefused: the source is no C3D file or lacks a label, or the target exists or cannot be written.
+
+    Raises
+    ------
+    FileRefused
+        The source is no C3D file or lacks a label, or the target exists or cannot be written.
     """
     content, parameters, layout, _ = open_c3d(source)
     columns = {split_label(label)[1]: column for column, label in enumerate(point_labels(parameters, layout))}

@@ -40,7 +40,10 @@ NO_OUTPUTS = FileOutputs({}, ())
 def read_outputs(path: str | Path) -> FileOutputs:
     """Return the joint angles, foot events and muscle activity of a C3D file; empty where it holds none.
 
-    FileRefused: the file cannot be read.
+    Raises
+    ------
+    FileRefused
+        The file cannot be read.
     """
     content, parameters, layout, _ = open_c3d(Path(path))
     listed = {split_label(label)[1] for label in texts(parameters, "POINT", "ANGLES")}
@@ -113,8 +116,10 @@ def poses_only(raw: RawC3d) -> str:
 def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
     """Return the points that are markers of ``subject`` (None = the only one).
 
-    FileRefused: labels of several subjects and none chosen, or the chosen one is not among them; the message lists the
-    subjects.
+    Raises
+    ------
+    FileRefused
+        Labels of several subjects and none chosen, or the chosen one is not among them; the message lists the subjects.
     """
     history: list[str] = []
     warnings: list[str] = []

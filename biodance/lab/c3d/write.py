@@ -86,7 +86,11 @@ def write_c3d(
     has no rate of its own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
     (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass
     kg, Height mm), and overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
-    BiodanceError: the file exists already, the rates or lengths do not fit each other, or a channel is not finite.
+
+    Raises
+    ------
+    BiodanceError
+        The file exists already, the rates or lengths do not fit each other, or a channel is not finite.
     """
     path = Path(path)
     samples = _samples(path, markers, plates, analog_rate)
@@ -273,8 +277,12 @@ def write_trial(trial: Trial, path: Path) -> None:
     """Write a trial as a C3D file: mm, N, N·mm, float32; z up; plates as TYPE 2 about the centres of their surfaces.
 
     The force in a plate's axes is the ground's action on the subject. What a trial holds beside markers, plates and
-    measurements of the body is left out. BiodanceError: markers and plates have rates that do not fit, a wrench is not
-    finite, or the file exists.
+    measurements of the body is left out.
+
+    Raises
+    ------
+    BiodanceError
+        Markers and plates have rates that do not fit, a wrench is not finite, or the file exists.
     """
     plates = [plate_recording(plate) for plate in trial.plates]
     rate = trial.plates[0].wrench.rate if trial.plates else 0.0

@@ -183,7 +183,10 @@ def _read_map(path: Path) -> MarkerSet:
 def parse_map(given: Mapping[str, Any], path: str) -> MarkerSet:
     """Return the marker set, without a name, of a map of labels to places; ``path`` names where it stands.
 
-    BiodanceError: a place is no landmark and no segment, or one landmark is given to two labels.
+    Raises
+    ------
+    BiodanceError
+        A place is no landmark and no segment, or one landmark is given to two labels.
     """
     markers: dict[str, _SetMarker] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
@@ -314,8 +317,13 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     """Return a marker set: a shipped or installed one by its name, a user's own by the path of its TOML file (then the
     path is its name), or by the path of a session.toml that has a ``[markers] map``.
 
-    UnknownName: there is no set of that name. BiodanceError: the file is missing, is not TOML, or breaks a rule; the
-    message names the file, the entry and what would be legal.
+    Raises
+    ------
+    UnknownName
+        There is no set of that name.
+    BiodanceError
+        The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be
+        legal.
     """
     if str(name_or_path).startswith(GUESSED):
         return _guessed(str(name_or_path))
@@ -396,7 +404,11 @@ def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     """Return the markers of the set only, under the set's own labels and in its order.
 
     A moving trial need not have all that the static one has: which joints its markers determine is not asked here.
-    TrialRefused: no required label of the set is there.
+
+    Raises
+    ------
+    TrialRefused
+        No required label of the set is there.
     """
     match = marker_set.match(markers.names)
     absent = [label for label in marker_set.required if label not in match]
@@ -414,7 +426,12 @@ def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None
 
     The first alternative of which every label was recorded is taken, as the mean of its markers; NaN in frames where
     one of them is not seen. None where the set or the recording does not have this landmark. ``markers`` may have the
-    file's or the set's labels. UnknownName: ``name`` is no landmark that biodance knows.
+    file's or the set's labels.
+
+    Raises
+    ------
+    UnknownName
+        ``name`` is no landmark that biodance knows.
     """
     refuse_unknown("landmark", name, LANDMARKS)
     match = marker_set.match(markers.names)

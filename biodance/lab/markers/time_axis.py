@@ -102,9 +102,13 @@ def time_axis(stamps: Array, *, where: str, row: str = "row") -> TimeAxis:
     """Return the time axis of rows with ``stamps`` (S,) s; ``row`` is what the file calls one.
 
     Stamps within a fifth of a step of equal steps are equal steps, rounded. Others are resampled at their median step;
-    single rows at an end, before or behind a hole of more than 2.5 steps, are left out. Rows more than 0.2 s apart are
-    single postures: they are kept as they are, on equal steps. FileRefused: ``where``: a stamp is no number, or they do
-    not increase.
+    single rows at an end, before or behind a hole of more than 2.5 steps, are left out. Rows
+    more than 0.2 s apart are single postures: they are kept as they are, on equal steps.
+
+    Raises
+    ------
+    FileRefused
+        ``where``: a stamp is no number, or they do not increase.
     """
     bad = np.isnan(stamps)
     if bad.any() or np.any(np.diff(stamps) <= 0):

@@ -28,8 +28,12 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
 
     ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the
     lab. Corners that have an impossible size in the file's unit are taken as m or mm where that gives a legal one.
-    TrialRefused: the corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is
-    steeper than 45 degrees.
+
+    Raises
+    ------
+    TrialRefused
+        The corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is steeper
+        than 45 degrees.
     """
     if not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
         raise TrialRefused(

@@ -167,8 +167,12 @@ def plate_parameters(
     """Return the parameters of plate ``number`` (from 1), those that are ``told`` instead of the file's.
 
     ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab (None = they are the
-    same): what is told in m and in the lab frame is turned into them. TrialRefused: an entry is missing, not finite or
-    out of range, or the TYPE is not one that can be computed.
+    same): what is told in m and in the lab frame is turned into them.
+
+    Raises
+    ------
+    TrialRefused
+        An entry is missing, not finite or out of range, or the TYPE is not one that can be computed.
     """
     told, group = told or NOTHING_TOLD, raw.parameters.get("FORCE_PLATFORM", {})
     described = _numbers(group, "TYPE").size >= number

@@ -96,8 +96,11 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
     """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its
     extension.
 
-    FileRefused: the file is missing, empty, no ordinary file, subject data instead of a recording, or of no known
-    format; the message lists the legal formats.
+    Raises
+    ------
+    FileRefused
+        The file is missing, empty, no ordinary file, subject data instead of a recording, or of no known format; the
+        message lists the legal formats.
     """
     path = Path(path)
     head = read_head(path)
@@ -119,7 +122,10 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
 def read_head(path: Path) -> bytes:
     """Return the first `HEAD` bytes of a file.
 
-    FileRefused: the file is missing, empty, cannot be opened, or is none: a folder, a pipe, a device.
+    Raises
+    ------
+    FileRefused
+        The file is missing, empty, cannot be opened, or is none: a folder, a pipe, a device.
     """
     if path.is_dir():
         raise FileRefused(f"{path}: is a folder, a file is expected. Point at one recording.")

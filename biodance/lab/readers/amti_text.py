@@ -231,8 +231,13 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     """Read a text export of one AMTI plate; what the text does not say stands in a small TOML file of the same name
     beside it.
 
-    The wrench is as in `biodance.lab.readers.bsf`. FileRefused: the file is missing or no table of numbers, or order,
-    units, rate or plate size are said nowhere; the message shows the TOML to write.
+    The wrench is as in `biodance.lab.readers.bsf`.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing or no table of numbers, or order, units, rate or plate size are said nowhere; the message
+        shows the TOML to write.
     """
     path = Path(path)
     text, commas = with_points(read_text(path))

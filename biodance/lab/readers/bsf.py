@@ -178,8 +178,13 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     """Read a NetForce .bsf file, version 100 or 105, as a trial without markers.
 
     The wrench is the ground's action ON the subject in N, N·m about the lab origin: the centre of the first plate's
-    surface, x as the plate's x, z up. FileRefused: the file is missing, damaged or cut off, has another version, or a
-    plate has no calibration or an impossible size.
+    surface, x as the plate's x, z up.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, damaged or cut off, has another version, or a plate has no calibration or an impossible
+        size.
     """
     path = Path(path)
     content = read_bytes(path)

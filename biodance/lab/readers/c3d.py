@@ -97,7 +97,10 @@ read = read_c3d
 def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
     """Return the file's unit of length in m and lab_R_file (3, 3), as `read_c3d` takes them.
 
-    FileRefused: as `read_c3d`.
+    Raises
+    ------
+    FileRefused
+        As `read_c3d`.
     """
     labels = marker_labels(raw, subject=subject)
     return _in_lab(raw, labels, recognise(labels.names))[1:3]

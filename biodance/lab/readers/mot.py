@@ -82,8 +82,13 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     The axis of the mean total force is taken as up: y as OpenSim writes it, or z. Torques a thousand times too large
     are N·mm. What the rows without load read is taken off all rows. A plate that is never loaded (20 N) is left out.
     Its corners enclose the centres of pressure while loaded plus 0.15 m, since the file does not tell where the plate
-    lies. FileRefused: ``where`` (the file): no plate columns, a force that is NaN, a point that is NaN under load or
-    farther than 50 m (not in metres).
+    lies.
+
+    Raises
+    ------
+    FileRefused
+        ``where`` (the file): no plate columns, a force that is NaN, a point that is NaN under load or farther than 50 m
+        (not in metres).
     """
     groups = _groups(table.columns)
     if not groups:

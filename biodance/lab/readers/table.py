@@ -51,8 +51,11 @@ def is_parquet(content: bytes) -> bool:
 def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:
     """Return the cells of a table of ``least`` columns or more in a file's ``content``.
 
-    FileRefused: no row of labels, rows of the wrong length, a cell that is no number, a Parquet file that is damaged or
-    cannot be read for want of pyarrow.
+    Raises
+    ------
+    FileRefused
+        No row of labels, rows of the wrong length, a cell that is no number, a Parquet file that is damaged or cannot
+        be read for want of pyarrow.
     """
     return _of_parquet(content, path) if is_parquet(content) else _of_text(decode(content, path), path, least)
 
@@ -277,8 +280,11 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
 
     Lengths and times are in the units of the labels, else in those in which a person has a person's size and the steps
     are those of a camera. Samples at (0, 0, 0) and single-frame jumps are not seen, before anything is resampled.
-    FileRefused: no table, no time, fewer than three markers, a time that does not increase, a marker cloud of no
-    person's size.
+
+    Raises
+    ------
+    FileRefused
+        No table, no time, fewer than three markers, a time that does not increase, a marker cloud of no person's size.
     """
     content = read_bytes(path)
     cells = read_cells(content, path)

@@ -121,8 +121,13 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     """Return the trial of a .trc file: markers in metres, z up, NaN where a marker was not seen; no plates.
 
     Frames that are left out in the file are given back as unseen, so that the time steps are equal; where they change,
-    the markers are resampled on their own stamps (`time_axis`). FileRefused: not a .trc file, a header without rate,
-    unit or labels, a cell that is no number, rows of the wrong length, time running back.
+    the markers are resampled on their own stamps (`time_axis`).
+
+    Raises
+    ------
+    FileRefused
+        Not a .trc file, a header without rate, unit or labels, a cell that is no number, rows of the wrong length, time
+        running back.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -163,8 +168,12 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
     """Write markers as OpenSim expects them: millimetres, y up, an empty cell where a marker was not seen; return the
     path.
 
-    FileRefused: the file exists (nothing is overwritten). TrialRefused: the markers hold no frame or no marker, or
-    their time steps are not equal (the format holds one rate).
+    Raises
+    ------
+    FileRefused
+        The file exists (nothing is overwritten).
+    TrialRefused
+        The markers hold no frame or no marker, or their time steps are not equal (the format holds one rate).
     """
     path = Path(path)
     if not markers.names or not markers.time.size:

@@ -59,7 +59,10 @@ def _index_of(folder: Path) -> Path | None:
 def read_index(path: Path) -> tuple[IndexedTrial, ...]:
     """Return the rows of a table in their order; rows whose recording is not there are left out.
 
-    FileRefused: it is no table, lacks a column, or no recording that it names is there.
+    Raises
+    ------
+    FileRefused
+        It is no table, lacks a column, or no recording that it names is there.
     """
     header, *rows = _rows(path)
     names = [cell.strip().lower() for cell in header]
@@ -111,7 +114,10 @@ def read_plate_text(path: Path) -> Trial:
     """Return a recording of one plate in its own axes, turned so that a load pushes the person up; its corners, which
     the text does not tell, are NaN.
 
-    FileRefused: the header does not name six channels with units that are known, or a cell is no number.
+    Raises
+    ------
+    FileRefused
+        The header does not name six channels with units that are known, or a cell is no number.
     """
     text, commas = with_points(read_text(path))
     lines = [line for line in text.splitlines() if line.strip()]
@@ -170,7 +176,11 @@ def archive_folders(archive: str | Path) -> tuple[tuple[Path, ...], tuple[Path, 
     whose recordings say nothing by themselves, both sorted.
 
     A folder with recordings, or with parts such as ``static`` and ``dynamic`` that hold them, is a session.
-    SessionRefused: there is no such folder, or nothing in it.
+
+    Raises
+    ------
+    SessionRefused
+        There is no such folder, or nothing in it.
     """
     archive = archive_folder(archive)
     sessions: list[Path] = []

@@ -31,8 +31,11 @@ _EXAMPLE = '{side = "left", kind = "strike", time = 1.23}'
 def legal_events(given: Sequence[Mapping[str, float | str]] | None) -> tuple[FootEvent, ...]:
     """Return the events that a list of ``{side, kind, time}`` says, in the order of time; ``kind`` strike or off.
 
-    SessionRefused: a key is missing or unknown, a value is not legal, or a foot strikes twice without an off between
-    (or leaves twice without a strike).
+    Raises
+    ------
+    SessionRefused
+        A key is missing or unknown, a value is not legal, or a foot strikes twice without an off between (or leaves
+        twice without a strike).
     """
     found = sorted((_event(one) for one in given or ()), key=lambda one: one.time)
     for side in SIDES:
@@ -62,7 +65,10 @@ def _event(given: Mapping[str, float | str]) -> FootEvent:
 def with_events(trial: Trial, events: tuple[FootEvent, ...]) -> Trial:
     """Return a trial with the ``events`` that session.toml says; the history names their sides.
 
-    TrialRefused: one is not within the trial.
+    Raises
+    ------
+    TrialRefused
+        One is not within the trial.
     """
     clocks = [trial.markers.time] if trial.markers is not None else []
     clocks += [plate.wrench.time for plate in trial.plates]
@@ -103,7 +109,10 @@ class Exchange:
 def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exchange, ...]:
     """Return the exchanges that a list of ``[label, label]`` or ``[label, label, from s, to s]`` says.
 
-    SessionRefused: an entry is none of the two, names one label twice, or ends before it begins.
+    Raises
+    ------
+    SessionRefused
+        An entry is none of the two, names one label twice, or ends before it begins.
     """
     found = []
     for entry in given or ():
@@ -121,7 +130,10 @@ def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exch
 def legal_spans(given: Sequence[Sequence[float | str]] | None) -> tuple[LeftOutSpan, ...]:
     """Return the spans that a list of ``[from s, to s]`` or ``[from s, to s, side]`` says, in the order of time.
 
-    SessionRefused: an entry is none of the two, or ends before it begins.
+    Raises
+    ------
+    SessionRefused
+        An entry is none of the two, or ends before it begins.
     """
     found = []
     for entry in given or ():
@@ -221,7 +233,10 @@ _HEAVIEST = 30.0
 def legal_prosthesis(segment: str | None) -> str:
     """Return the segment that a prosthesis begins with, "" for None.
 
-    SessionRefused: it is no segment of an arm or leg; the message lists them.
+    Raises
+    ------
+    SessionRefused
+        It is no segment of an arm or leg; the message lists them.
     """
     if segment and segment not in _LIMBS:
         told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", segment, _LIMBS)
@@ -232,7 +247,10 @@ def legal_prosthesis(segment: str | None) -> str:
 def legal_devices(given: Mapping[str, float]) -> dict[str, float]:
     """Return what is worn, kg by segment.
 
-    SessionRefused: there is no such segment, or the mass is none of a device.
+    Raises
+    ------
+    SessionRefused
+        There is no such segment, or the mass is none of a device.
     """
     for segment, mass in given.items():
         if segment not in MARKED_SEGMENTS:
@@ -264,7 +282,10 @@ class PlateEntry(BaseModel):
 def told_plate(name: str, entry: PlateEntry) -> ToldPlate:
     """Return what a table ``[plates.NAME]`` says.
 
-    SessionRefused: there is no such plate, or a value is not legal; the message says what would be.
+    Raises
+    ------
+    SessionRefused
+        There is no such plate, or a value is not legal; the message says what would be.
     """
     if not re.fullmatch(r"plate[1-9]\d?", name):
         raise SessionRefused(f"[plates.{name}] is no plate. Legal names are plate1, plate2 ..., as inspect shows them.")

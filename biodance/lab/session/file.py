@@ -90,8 +90,10 @@ def usual_girths() -> Mapping[str, float]:
 def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
     """Return girths (m) by name: ``thigh`` of both sides, ``right_thigh`` of one; a calf is the girth of the shank.
 
-    SessionRefused: a name is not known, stands for two entries, has a side that it cannot have, or the value is no
-    person's.
+    Raises
+    ------
+    SessionRefused
+        A name is not known, stands for two entries, has a side that it cannot have, or the value is no person's.
     """
     found: dict[str, float] = {}
     for said, value in given.items():
@@ -130,7 +132,10 @@ _HEEL = 0.15  # Share of the length, from the heel, at which its breadth is meas
 def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
     """Return the outline of each foot from sizes in m: ``length`` of both or ``right_length`` of one foot.
 
-    SessionRefused: a name is not known, a value is no foot's, or a foot misses a size.
+    Raises
+    ------
+    SessionRefused
+        A name is not known, a value is no foot's, or a foot misses a size.
     """
     for name, value in given.items():
         short = next((name.removeprefix(f"{side}_") for side in SIDES if name.startswith(f"{side}_")), name)
@@ -167,8 +172,10 @@ def traced_outline(path: str | Path) -> dict[str, FootSizes]:
     """Return the outline of each foot from a CSV file with the columns ``side`` (right, left), ``x_cm`` from the heel
     to the toes and ``y_cm`` across: points in order round each foot.
 
-    SessionRefused: the file is missing, has other columns, no number where one belongs, or fewer than 12 points of a
-    foot.
+    Raises
+    ------
+    SessionRefused
+        The file is missing, has other columns, no number where one belongs, or fewer than 12 points of a foot.
     """
     path = Path(path)
     if not path.is_file():
@@ -343,7 +350,10 @@ def read_session_file(folder: Path) -> SessionFile:
     """Return what ``session.toml`` (and ``subject.toml`` or ``session.toml`` in the folder above) says; empty where
     there is none.
 
-    SessionRefused: a file is not TOML, has an unknown key (the closest legal one is named) or a value out of bounds.
+    Raises
+    ------
+    SessionRefused
+        A file is not TOML, has an unknown key (the closest legal one is named) or a value out of bounds.
     """
     folder = folder.resolve()
     paths = [place / name for place in (folder.parent, folder) for name in FILES if (place / name).is_file()]
@@ -368,8 +378,12 @@ def read_session_file(folder: Path) -> SessionFile:
 def check_session_text(path: Path, text: str) -> None:
     """Refuse a ``text`` that would not be legal as the content of the session file ``path``.
 
-    FileRefused: it is no TOML. SessionRefused: it has an unknown key or a value that is not legal; the message says
-    what would be.
+    Raises
+    ------
+    FileRefused
+        It is no TOML.
+    SessionRefused
+        It has an unknown key or a value that is not legal; the message says what would be.
     """
     content = _checked(path, parse_toml(text, path))
     _settings([path], [content])

@@ -39,7 +39,11 @@ def read_mp(path: str | Path) -> dict[str, float]:
     """Return the measurements of an .mp file, rows such as ``$Bodymass = 66.2``: by name, in m and kg.
 
     Rows that hold no number (a name, a comment) are passed over; zeros mean "not measured" and are left out.
-    FileRefused: missing, empty, binary, or without a single ``$Name = number``.
+
+    Raises
+    ------
+    FileRefused
+        Missing, empty, binary, or without a single ``$Name = number``.
     """
     path = Path(path)
     rows = re.findall(r"^\s*\$(\w+)\s*=\s*([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*$", read_text(path), flags=re.MULTILINE)
@@ -55,7 +59,12 @@ def read_vsk(path: str | Path) -> dict[str, float]:
     and kg.
 
     ``LeftLegLength`` is called ``LLegLength`` here, as in .mp and C3D files. Values that Nexus computes (read-only) are
-    left out. FileRefused: missing, empty, no XML, or no Vicon skeleton.
+    left out.
+
+    Raises
+    ------
+    FileRefused
+        Missing, empty, no XML, or no Vicon skeleton.
     """
     path = Path(path)
     text = decode(read_bytes(path), path)
@@ -101,7 +110,12 @@ def read_enf(path: str | Path) -> EclipseNotes:
     empty notes.
 
     The rows are taken as they come (a note may hold any character), the encoding is found by itself, keys count without
-    case. FileRefused: missing, empty or binary.
+    case.
+
+    Raises
+    ------
+    FileRefused
+        Missing, empty or binary.
     """
     path = Path(path)
     fields: dict[str, str] = {}

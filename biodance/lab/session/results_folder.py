@@ -67,7 +67,10 @@ def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str]) -> No
 def read_manifest(folder: Path) -> _Manifest | None:
     """Return the manifest of a results folder; None where there is none (an earlier version, or no results).
 
-    FileRefused: it is damaged.
+    Raises
+    ------
+    FileRefused
+        It is damaged.
     """
     path = folder / _MANIFEST
     if not path.is_file():
@@ -143,7 +146,12 @@ class ResultsFolder:
         """Bind what was written to the recordings of a ``session`` (``inputs``: name -> SHA-256) and put it in place.
 
         Return the folder to which the files of an earlier run's folder went that were not biodance's; None if there
-        were none. SessionRefused: the disk is full, or the place cannot be written to; what was there is as before.
+        were none.
+
+        Raises
+        ------
+        SessionRefused
+            The disk is full, or the place cannot be written to; what was there is as before.
         """
         with _as_before(self.place):
             write_manifest(self.part, session, inputs)
@@ -212,9 +220,13 @@ def results_folder(out: str | Path, session: str | Path, *, force: bool = False)
     """Return where the results of a session are written, before they take their place.
 
     ``force`` allows a place that holds results of an earlier run (a results.json or report.html); all of them are
-    replaced, and files that are not of biodance are kept beside it. SessionRefused: another run is writing there; the
-    place is the session folder or one above it, is a file, holds recordings, holds anything at all without ``force``,
-    or holds only files that biodance did not write.
+    replaced, and files that are not of biodance are kept beside it.
+
+    Raises
+    ------
+    SessionRefused
+        Another run is writing there; the place is the session folder or one above it, is a file, holds recordings,
+        holds anything at all without ``force``, or holds only files that biodance did not write.
     """
     session = Path(os.path.realpath(session))  # unlike Path.resolve, it takes a circle of links
     folder = Path(os.path.realpath(out))
@@ -260,8 +272,12 @@ def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
     """Yield a folder beside ``folder`` to write into; when all is written, it is flushed to the disk and takes its
     place in one step. What fails or is stopped leaves ``folder`` as it was.
 
-    ``folder`` must be missing or empty, unless ``over`` allows to replace all of it. SessionRefused: it holds files, is
-    one, another run is writing there, or it cannot be written.
+    ``folder`` must be missing or empty, unless ``over`` allows to replace all of it.
+
+    Raises
+    ------
+    SessionRefused
+        It holds files, is one, another run is writing there, or it cannot be written.
     """
     if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not over)):
         raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")

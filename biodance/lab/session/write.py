@@ -150,7 +150,10 @@ def registered_folder(folder: Path, *, force: bool) -> Path:
     """Return the folder for a registered session, which is missing, empty, or with ``force`` an earlier one; nothing is
     made or removed yet.
 
-    SessionRefused: it is a file, or holds files: others' always, those of an earlier registration without ``force``.
+    Raises
+    ------
+    SessionRefused
+        It is a file, or holds files: others' always, those of an earlier registration without ``force``.
     """
     if folder.exists() and not folder.is_dir():
         raise SessionRefused(f"{folder}: is a file; a session needs a folder. Choose another name.")
@@ -171,8 +174,12 @@ def write_registered(
     static trials and the subject's files of its ``session`` beside it, and what was ``said`` of the plates as
     `registration.json`; return the C3D file. An earlier registration in the folder is replaced.
 
-    Frames of markers that the plates do not cover are left out, as C3D holds no unknown force. SessionRefused: the two
-    share no time.
+    Frames of markers that the plates do not cover are left out, as C3D holds no unknown force.
+
+    Raises
+    ------
+    SessionRefused
+        The two share no time.
     """
     assert trial.markers is not None
     markers, recordings, rate = _common(trial.markers, plates)
