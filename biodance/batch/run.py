@@ -343,13 +343,35 @@ def run_batch(
     A run that was stopped is gone on with by the same call: sessions that are done with the recordings, settings and
     version of now are not gone through again.
 
-    ``archive`` holds session folders at any depth; ``out`` is empty, new, or of an earlier run over this archive, and
-    gets ``summary.parquet``, ``summary.csv`` and ``report.html``; ``workers`` processes of this machine, by default one
-    for each core, or the address of a Dask scheduler whose workers see both folders; ``chosen`` settings, such as
-    ``filter.cutoff=6``; ``pages`` whether a page is drawn for every session; ``limit`` s after which one is given up;
-    ``work`` what is done with one (for tests); ``tell`` is called with what is being done, how many sessions are
-    finished, and of how many. BiodanceError: there is no session, the results' folder is taken, or settings or workers
-    are not legal.
+    Parameters
+    ----------
+    archive : str or pathlib.Path
+        Folder with session folders at any depth.
+    out : str or pathlib.Path
+        Folder for the results: empty, new, or of an earlier run over this archive.
+    workers : int or str, optional
+        Processes of this machine, by default one for each core; or the address of a Dask scheduler whose workers see
+        both folders.
+    chosen : tuple of str
+        Settings, such as ``filter.cutoff=6``.
+    pages : bool
+        Whether a page is drawn for every session.
+    limit : float
+        s after which a session is given up.
+    work : callable
+        What is done with one session; for tests.
+    tell : callable, optional
+        Called with what is being done, how many sessions are finished, and of how many.
+
+    Returns
+    -------
+    BatchRun
+        What became of every session; ``summary.parquet``, ``summary.csv`` and ``report.html`` in ``out``.
+
+    Raises
+    ------
+    BiodanceError
+        There is no session, the results' folder is taken, or settings or workers are not legal.
     """
     archive, folder = Path(archive), Path(out)
     assignments(chosen)

@@ -134,10 +134,24 @@ class DeviationReference:
 def deviation_reference(strides: Array, healthy: Array, *, features: int = FEATURES) -> DeviationReference:
     """Return the reference of the gait deviation index.
 
-    ``strides`` (n, 459) gait vectors, deg, of all who were measured, patients too: their singular vectors are the
-    features, of which ``features`` are kept (at most n), without the mean taken off (Schwartz and Rozumalski 2008,
-    doi:10.1016/j.gaitpost.2008.05.001); ``healthy`` (m, 459) one of each healthy leg. BiodanceError: fewer strides than
-    features, or fewer than two healthy legs.
+    Parameters
+    ----------
+    strides : (n, 459) array
+        Gait vectors, deg, of all who were measured, patients too: their singular vectors are the features.
+    healthy : (m, 459) array
+        One of each healthy leg.
+    features : int
+        How many features are kept; at most n.
+
+    Raises
+    ------
+    BiodanceError
+        Fewer strides than features, or fewer than two healthy legs.
+
+    References
+    ----------
+    Schwartz and Rozumalski 2008, doi:10.1016/j.gaitpost.2008.05.001: the singular vectors are of the vectors as they
+    are, without their mean taken off.
     """
     if len(strides) < features or len(healthy) < 2:
         raise BiodanceError(

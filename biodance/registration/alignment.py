@@ -32,9 +32,16 @@ _UNSIZED = "MOT"
 
 @dataclass(frozen=True, eq=False)
 class FramePose:
-    """Where the frame of a force file lies in the room, and how late its clock is: ``delay`` s, the force file's time
-    of an event minus the marker file's (forces late = positive); ``yaw`` rad from room x to the file's x, about the
-    vertical; ``shift`` (3,) m, origin of the file's frame in the room.
+    """Where the frame of a force file lies in the room, and how late its clock is.
+
+    Parameters
+    ----------
+    delay : float
+        s, the force file's time of an event minus the marker file's: forces late = positive.
+    yaw : float
+        rad, from room x to the file's x, about the vertical.
+    shift : array_like
+        (3,) m, origin of the file's frame in the room.
     """
 
     delay: float

@@ -32,13 +32,34 @@ _FILE = "session.toml"
 
 def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
     """Read a session and write what is declared of it into its session.toml, and what was guessed as comments, to be
-    confirmed or corrected; ``subject_name`` chooses the person in C3D files that hold several.
+    confirmed or corrected.
 
-    The dictionary holds ``file`` that was written; ``subject`` {name, mass_kg, height_m, sex, age, guessed: [names]};
-    ``trials`` [{name, role, why}]; ``marker_set`` name, "guessed" or None; ``marker_map`` label -> landmark or segment
-    where it was guessed, else None; ``markers`` whether there are any; ``plates`` [{trial, name, type, decisions}];
-    ``refused`` file -> reason; ``notes``. SessionRefused: there is a session.toml already, or the session cannot be
-    read.
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and no session.toml yet.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+
+    Returns
+    -------
+    dict
+        ``file`` that was written; ``subject`` {name, mass_kg, height_m, sex, age, guessed: [names]}; ``trials``
+        [{name, role, why}]; ``marker_set`` name, "guessed" or None; ``marker_map`` label -> landmark or segment where
+        it was guessed, else None; ``markers`` whether there are any; ``plates`` [{trial, name, type, decisions}];
+        ``refused`` file -> reason; ``notes``.
+
+    Raises
+    ------
+    SessionRefused
+        There is a session.toml already, or the session cannot be read.
+
+    Examples
+    --------
+    >>> from biodance.lab.session.write import init_session
+    >>> init_session("visit")
+    Traceback (most recent call last):
+    biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
     """
     target = Path(folder) / _FILE
     if target.exists():
