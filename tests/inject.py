@@ -99,8 +99,8 @@ def _plates(raw: RawC3d, axes: _Axes) -> tuple[_Stored, ...]:
         signals = raw.analog[:, columns] * (factors if plate.type == 2 else 1.0)
         matrix = None if plate.calibration is None else plate.calibration * factors[:, None]
         corners = axes.lab(plate.corners)
-        decoded = decode_plates(raw, [plate], metres=axes.metres, turn=axes.turn, mass=None)
-        (reading,), _ = with_loads_on_plates(decoded.readings)
+        decoded, _, _ = decode_plates(raw, [plate], metres=axes.metres, turn=axes.turn, mass=None)
+        (reading,), _ = with_loads_on_plates(decoded)
         origin = sensor_below(reading.vector, reading.axes)[0]
         recording = PlateRecording(plate.type, corners, origin, signals, calibration=matrix)
         sign = -1.0 if gravity_sign(reading.sensor[reading.loaded], reading.axes) < 0 else 1.0

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biodance.cycles.jumps import jumps
-from biodance.cycles.lifts import lift
+from biodance.cycles.lifts import jumps, lift
 from biodance.records import Wrench
 
 RATE, WEIGHT, G = 100.0, 600.0, 9.81

@@ -7,9 +7,8 @@ import pytest
 from made_cycles import curve, cycle, trial
 
 from biodance.body.human.human import human
-from biodance.cycles.curves import CycleCurve
+from biodance.cycles.curves import CycleCurve, ground_curves
 from biodance.cycles.cut import Cycle
-from biodance.cycles.ground import ground_curves
 from biodance.cycles.keys import key_values
 from biodance.cycles.strides import Stride
 from biodance.cycles.summary import LeftOutBecause, repetitions_of, symmetry_index

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from made_cycles import cycle, level_gait
 
-from biodance.cycles.curves import NormalCurve
 from biodance.cycles.scores import (
     SCORE_ANGLES,
     DeviationReference,
+    NormalCurve,
     deviation_of,
     deviation_reference,
     deviation_toml,

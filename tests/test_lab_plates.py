@@ -209,5 +209,5 @@ def test_centre_of_pressure_is_unknown_without_load():
     raw = raw_file([plate], [np.zeros((50, 6))])
     turn = np.eye(3)
     declared = declared_plates(raw, {}, metres=0.001, turn=turn)
-    (reading,) = decode_plates(raw, declared.plates, metres=0.001, turn=turn, mass=None).readings
+    ((reading,), _, _) = decode_plates(raw, declared.plates, metres=0.001, turn=turn, mass=None)
     assert np.isnan(pressure_point(reading)).all()

@@ -63,7 +63,9 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     with whole_file(folder / "summary.parquet", over=True) as part:
         table.to_parquet(part, index=False)
     alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
-    page = _page(name, outcomes, table, left_out, _links(folder, outcomes), alike)
+    pages = {one.name: f"{SESSIONS}/{folder_name(one.name)}/{_PAGE}" for one in outcomes}
+    links = {name: quote(page) for name, page in pages.items() if (folder / page).is_file()}
+    page = _page(name, outcomes, table, left_out, links, alike)
     write_files(folder, {"summary.csv": for_spreadsheets(table).to_csv(index=False, lineterminator="\n"), _PAGE: page})
 
 
@@ -111,12 +113,6 @@ def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ..
             plates = frozenset(plate["name"] for trial in document["trials"] for plate in trial["plates"])
             found.append(SessionLeft(name, plates, left, told=one["verdict"] in ("nothing wrong", "named, complete")))
     return tuple(found)
-
-
-def _links(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
-    """Return the address of every session's own page, where one was drawn."""
-    pages = {one.name: f"{SESSIONS}/{folder_name(one.name)}/{_PAGE}" for one in outcomes}
-    return {name: quote(page) for name, page in pages.items() if (folder / page).is_file()}
 
 
 def _figure(table: "pd.DataFrame") -> "Figure | None":

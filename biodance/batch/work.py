@@ -59,24 +59,10 @@ class SessionStatus(StrEnum):
 
 @dataclass(frozen=True)
 class SessionTask:
-    """One session to go through.
-
-    Parameters
-    ----------
-    name : str
-        The session's folder below the archive.
-    session, out : str
-        Folders of the recordings and of the results.
-    fingerprint : str
-        Of the recordings, the settings and the version (`fingerprint_of`).
-    chosen : tuple of str
-        Settings, such as ``filter.cutoff=6``.
-    pages : bool
-        Whether the page is drawn; numbers are written always.
-    limit : float
-        s after which the session is given up.
-    tables : bool
-        Whether the results are also written as tables, into the folder `TABLES`.
+    """One session to go through: its ``name``, the folder below the archive; folders of the recordings (``session``)
+    and of the results (``out``); ``fingerprint`` of recordings, settings and version (`fingerprint_of`); settings
+    ``chosen``, such as ``filter.cutoff=6``; whether the page is drawn (``pages``; numbers are written always);
+    ``limit`` s after which it is given up; whether the results are also written as ``tables`` (`TABLES`).
     """
 
     name: str
@@ -91,24 +77,10 @@ class SessionTask:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one session.
-
-    Parameters
-    ----------
-    name, fingerprint : str
-        Of its `SessionTask`.
-    status : SessionStatus
-        What became of it.
-    reason : str
-        Why, where it is not done; else the first thing that a person must see.
-    rows : tuple of dict
-        One for each trial, of plain values.
-    seconds, memory_mb : float
-        It took, and the process had at most.
-    why : Why
-        What it hangs on.
-    limit : float
-        s that it was given.
+    """What became of one session: ``name`` and ``fingerprint`` of its `SessionTask`; its ``status``; the ``reason`` why
+    it is not done, else the first thing that a person must see; ``rows`` of plain values, one for each trial; the
+    ``seconds`` that it took and the ``memory_mb`` that its process had at most; ``why``: what it hangs on; ``limit`` s
+    that it was given.
     """
 
     name: str
@@ -135,12 +107,8 @@ class Outcome:
 
 def untold(task: SessionTask, status: SessionStatus, reason: str, why: Why) -> Outcome:
     """Return the outcome of a session of which nothing but the reason can be told."""
-    return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why, limit=task.limit)
-
-
-def only_row(status: SessionStatus, reason: str) -> TrialRows:
-    """Return the one row of a session of which nothing but the reason can be told."""
-    return ({"trial": "", "status": str(status), "reason": reason},)
+    row = {"trial": "", "status": str(status), "reason": reason}
+    return Outcome(task.name, task.fingerprint, status, reason, (row,), why=why, limit=task.limit)
 
 
 def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
@@ -273,7 +241,7 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tu
         why, reason = Why.SESSION, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
     reason = readable(reason)
     tell(f"{status}: {reason}")
-    return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why), {}
+    return untold(task, status, reason, why), {}
 
 
 def _hangs_on(error: BaseException) -> Why:

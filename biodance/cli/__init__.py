@@ -11,22 +11,10 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, compare, dance, diagnose, files, session, virtual, window
+from biodance.cli import archive, dance, diagnose, files, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
-__all__ = [
-    "app",
-    "archive",
-    "compare",
-    "dance",
-    "diagnose",
-    "files",
-    "main",
-    "run",
-    "session",
-    "virtual",
-    "window",
-]
+__all__ = ["app", "archive", "dance", "diagnose", "files", "main", "run", "session", "virtual"]
 
 
 _NEW_OBJECTS = 1_000_000

@@ -88,7 +88,11 @@ def diagnose_command(
     """
     if robot.given:
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
-        return diagnose_robot(session, results, robot, for_people)
+        from biodance.report.robot import print_robot_diagnosis
+
+        told, folder, document = examine_robot(session, results, robot, for_people)
+        show(document, print_robot_diagnosis, json=results.json, path=folder / "report.html")
+        return NEEDS_A_PERSON if told.needs_a_person else DONE
     from biodance.pipeline import front
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
@@ -137,15 +141,6 @@ def examine_robot(
         folder = put_results(place, recording, {})
     results.show_page(folder)
     return result, folder, found
-
-
-def diagnose_robot(recording: Path, results: Results, robot: RobotFile, for_people: tuple[str, ...]) -> int:
-    """Say what about a robot or its laboratory is not as drawn, and return the exit code."""
-    from biodance.report.robot import print_robot_diagnosis
-
-    result, folder, found = examine_robot(recording, results, robot, for_people)
-    show(found, print_robot_diagnosis, json=results.json, path=folder / "report.html")
-    return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
 @app.command(name="identify")

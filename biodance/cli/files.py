@@ -1,4 +1,4 @@
-"""Commands on a machine and on what lies on its disk: doctor, init, register, inspect, settings, export, live."""
+"""Commands on a machine and what lies on its disk: app, doctor, init, register, inspect, settings, export, live."""
 
 import sys
 from contextlib import nullcontext
@@ -23,6 +23,7 @@ from biodance.cli.app import (
     say,
     show,
     show_place,
+    whole,
 )
 
 if TYPE_CHECKING:
@@ -252,3 +253,38 @@ def live_command(
     document = live_document(found)
     show(document, partial(print_live, found), json=json)
     return NEEDS_A_PERSON if found.warnings or found.cause else DONE
+
+
+@app.command(name="app")
+def app_command(
+    folder: Path | None = None,
+    *,
+    out: Annotated[
+        Path | None, Parameter(help="Folder of the results; default: FOLDER-results beside the folder.")
+    ] = None,
+    port: Annotated[int, Parameter(converter=whole, help="Port of 127.0.0.1; 0 takes a free one.")] = 0,
+    browser: Annotated[
+        bool, Parameter(negative=("--no-browser", "--no-open"), help="Open the window in the browser.")
+    ] = True,
+) -> int:
+    """Open the laboratory's window in the browser: the sessions of a folder, their roles, markers, plates and steps to
+    be corrected with the mouse, runs, results and exports. Ends with Ctrl-C; nothing leaves this machine.
+
+    Parameters
+    ----------
+    folder
+        Archive or session folder; default: the working folder.
+    """
+    from biodance.app.server import serve_window
+    from biodance.app.sessions import results_beside
+
+    place = Path(folder or ".").resolve()
+    results = out or results_beside(place)
+
+    def tell(address: str) -> None:
+        sys.stdout.write(f"{address}\n")
+        sys.stdout.flush()
+        say(f"The window over {place} is open; its results go to {results}. Ctrl-C ends it.")
+
+    serve_window(place, results, port=port, opened=browser, tell=tell)
+    return DONE

@@ -1,4 +1,4 @@
-"""The command report, and what the commands on a session share."""
+"""The commands report and compare, and what the commands on a session share."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -12,6 +12,9 @@ from biodance.cli.app import (
     NEEDS_A_PERSON,
     STOPPED,
     USUAL_READING,
+    ForceOption,
+    JsonOption,
+    OutOption,
     Reading,
     Results,
     app,
@@ -176,6 +179,37 @@ def report_command(
         folder = put_session_results(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)
+
+
+@app.command(name="compare")
+def compare_command(
+    *visits: Path,
+    out: OutOption,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
+    """Compare two or more visits of one person: what changed from the first to the last beyond its uncertainty.
+
+    Parameters
+    ----------
+    visits
+        Session folders of one person, the earliest first.
+    """
+    from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.visits import compare_visits, read_visits
+    from biodance.report.visits import COMPARE_PAGE, print_compared, write_visits
+
+    with progress() as tell:
+        sessions = read_visits(visits, tell=tell)
+        for one in sessions:  # the results lie among the recordings of none of them
+            place = results_folder(out, one.folder, force=force)
+        found = compare_visits(sessions, tell=tell)
+        tell("writing the page")
+        document = write_visits(found, place.part)
+        inputs = {trial.source.path: trial.source.sha256 for one in sessions for trial in one.trials}
+        folder = put_results(place, sessions[0].folder, inputs)
+    show(document, partial(print_compared, found), json=json, path=folder / COMPARE_PAGE)
+    return exit_code(document)
 
 
 def put_session_results(place: "ResultsFolder", session: "Session") -> Path:

@@ -1,4 +1,6 @@
-"""Curves over a cycle, 0 to 100 %: joint angles, pelvis and foot in the lab, centre of mass."""
+"""Curves over a cycle, 0 to 100 %: joint angles, pelvis and foot in the lab, centre of mass; moments and powers of the
+joints; what the ground does to a foot, in % of body weight, and where it presses the sole.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,17 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.cut import PERCENT, Cycle, heel_and_toe
 from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
 from biodance.motion.soles import Soles
 from biodance.records import SIDES, Array, Mask, Motion, Sip, Wrench, freeze
 from biodance.records.motion import BY_FRAME
+from biodance.settings import STANDARD_GRAVITY
+from biodance.spatial import zero_moment_point
 
 _TRAVELS = 0.3
 """m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
-_WHOLE = (PERCENT.size,)
+WHOLE = (PERCENT.size,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +38,7 @@ class CycleCurve:
     sd: Array
 
     def __post_init__(self) -> None:
-        freeze(self, f"CycleCurve {self.quantity}", value=_WHOLE, sd=_WHOLE)
+        freeze(self, f"CycleCurve {self.quantity}", value=WHOLE, sd=WHOLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,71 +173,6 @@ def direction_of(cycle: Cycle, pose: Poses, time: Array) -> Array:
     return np.asarray(chosen / np.linalg.norm(chosen))
 
 
-_FEWEST_PEOPLE = 3  # People without whom there is no band
-_EVERY = 5  # % between two values of a band in a file
-
-
-@dataclass(frozen=True, eq=False)
-class NormalCurve:
-    """One quantity over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in ``unit``."""
-
-    kind: str
-    quantity: str
-    unit: str
-    people: int
-    mean: Array
-    sd: Array
-
-    def __post_init__(self) -> None:
-        freeze(self, f"NormalCurve {self.quantity}", mean=_WHOLE, sd=_WHOLE)
-
-
-def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCurve, ...]:
-    """Return the bands of all quantities that at least `_FEWEST_PEOPLE` have all through the cycle.
-
-    ``people`` by name, with the curves of all their trials; a person's own mean is over trials and sides.
-    """
-    means: dict[tuple[str, str, str], dict[str, list[Array]]] = {}
-    for name, groups in people.items():
-        for one in groups:
-            means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
-    bands = []
-    for (kind, quantity, unit), own in means.items():
-        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
-        if len(whole) >= _FEWEST_PEOPLE:
-            bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
-    return tuple(bands)
-
-
-def normal_toml(bands: Sequence[NormalCurve], table: str = "normal") -> list[str]:
-    """Return the lines of a ``table`` in lab.toml: every fifth per cent; NaN where less than two are known."""
-    lines = []
-    for one in bands:
-        lines += [f'[{table}."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
-        for name, values in (("mean", one.mean), ("sd", one.sd)):
-            row = [f"{v:.4g}" for v in values[::_EVERY]]
-            half = len(row) // 2
-            lines += [f"{name} = [{', '.join(row[:half])},", f"  {', '.join(row[half:])}]"]
-        lines.append("")
-    return lines
-
-
-def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...]:
-    """Return the bands of ``[normal]``, read from a lab.toml.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        It is not what `normal_toml` writes.
-    """
-    bands = []
-    for name, row in raw.items():
-        kind, quantity = name.split(" ")
-        mean, sd = (np.interp(PERCENT, PERCENT[::_EVERY], np.asarray(row[key], dtype=float)) for key in ("mean", "sd"))
-        bands.append(NormalCurve(kind, quantity, str(row["unit"]), int(str(row["people"])), mean, sd))
-    return tuple(bands)
-
-
 _ENOUGH = 0.8  # Share of a cycle in which a moment or a power must be known
 _BEYOND = 0.05  # s before and behind a cycle that are looked at for its first and last per cent
 
@@ -294,3 +233,46 @@ def _moments_and_powers(
     names += [(body.joints[axes[-1]].name.rpartition("_")[0], "power") for axes in groups]
     stacked = np.concatenate([regressor, np.stack(rows, axis=1)], axis=1)
     return names, stacked, np.concatenate([given, np.stack(work, axis=1)], axis=1)
+
+
+_PRESSES = 0.05
+"""Share of body weight below which a centre of pressure is mostly noise."""
+
+
+def ground_curves(
+    cycle: Cycle, body: Body, motion: Motion, soles: Soles, feet: Mapping[str, Wrench], known: Mask
+) -> Iterator[CycleCurve]:
+    """Yield the ground reaction on the foot of a gait cycle (% of body weight) and its centre of pressure (m).
+
+    The reaction forwards along the way of walking, inwards (towards the other foot) and up is positive; zero in the
+    swing. The centre of pressure lies `pressure_ahead` of the heel along the sole and `pressure_outward` of its line
+    from heel to toe; NaN where the foot carries less than `_PRESSES` of the weight. ``feet`` the wrenches on the right
+    and the left foot, ``known`` (T, 2) where they are known: elsewhere all are NaN.
+    """
+    if cycle.side not in SIDES:
+        return
+    foot, outwards, part = SIDES.index(cycle.side), 1.0 if cycle.side == "right" else -1.0, cycle.frames(motion.time)
+    wrench, weight = feet[f"{cycle.side}_foot"].value[part], STANDARD_GRAVITY * float(body.sip.mass.sum())
+    time, told = motion.time[part], known[part, foot]
+    x, y = direction_of(cycle, poses(body, motion.q[part]), time)
+    carries = np.where(time > cycle.off, 0.0, 100 / weight)
+    shown = np.where(told, carries, np.nan)
+    inwards = -outwards * (wrench[:, :2] @ [y, -x])
+    for name, force in (("forward", wrench[:, :2] @ [x, y]), ("inward", inwards), ("up", wrench[:, 2])):
+        yield over_cycle(cycle, f"ground_reaction_{name}", cycle.side, "%", time, shown * force)
+    ahead, aside = _on_sole(body, soles.outline[part], foot, wrench, threshold=_PRESSES * weight)
+    inside = np.where(told, 1.0, np.nan)
+    for name, place in (("ahead", ahead), ("outward", outwards * aside)):
+        yield over_cycle(cycle, f"pressure_{name}", cycle.side, "m", time, inside * place)
+
+
+def _on_sole(body: Body, outline: Array, foot: int, wrench: Array, *, threshold: float) -> tuple[Array, Array]:
+    """Return where the pressure lies ahead of the heel along the sole of an ``outline`` (T, 2, P, 3) m and to the right
+    of that line, (T,) m each.
+    """
+    heel, toe = (place[:, foot, :2] for place in heel_and_toe(body, outline))
+    along = (toe - heel) / np.linalg.norm(toe - heel, axis=1, keepdims=True)
+    height = outline[:, foot, :, 2].min(axis=1)
+    from_heel = zero_moment_point(wrench, height=height, threshold=threshold)[:, :2] - heel
+    ahead = np.einsum("tk,tk->t", from_heel, along)
+    return ahead, from_heel[:, 0] * along[:, 1] - from_heel[:, 1] * along[:, 0]

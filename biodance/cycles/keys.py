@@ -10,7 +10,7 @@ from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.strides import STRIDE_UNITS, Stride
 from biodance.lab.plates.faults import GAIN
-from biodance.records import SIDES, Array
+from biodance.records import SIDES
 
 ANGLE_PANELS = (
     *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
@@ -121,7 +121,7 @@ def _of_load(one: CycleCurve, angles: Mapping[_Curve, CycleCurve]) -> Iterator[K
     """Yield both extremes with their uncertainty, and how fast the joint turns there if it is a power."""
     joint = one.quantity.partition("_")[0]
     turn = angles.get((one.cycle, one.side, _TURNS.get(joint, f"{joint}_flexion"))) if one.unit == "W/kg" else None
-    turning = None if turn is None else _turning(turn)
+    turning = None if turn is None else np.abs(np.gradient(np.radians(turn.value), turn.cycle.times()))
     for key, at in (("maximum", int(np.nanargmax(one.value))), ("minimum", int(np.nanargmin(one.value)))):
         rate = 0.0 if turning is None else float(turning[at])
         sd, rate = np.nan_to_num([one.sd[at], rate]).tolist()
@@ -149,11 +149,6 @@ def _of_ground(one: CycleCurve) -> Iterator[KeyValue]:
         found = {"first_peak": stance[first], "valley": valley, "second_peak": stance[second]}
     gain = error_size(GAIN.name, "Fz" if one.quantity == "ground_reaction_up" else "Fx")
     yield from (_key(one, key, float(value), sd=gain * abs(float(value))) for key, value in found.items())
-
-
-def _turning(one: CycleCurve) -> Array:
-    """Return how fast (101,) rad/s a joint turns over its cycle."""
-    return np.abs(np.gradient(np.radians(one.value), one.cycle.times()))
 
 
 def stride_values(strides: Sequence[Stride], *, leading: str) -> tuple[KeyValue, ...]:

@@ -17,7 +17,15 @@ from biodance.cycles.beside import (
     emg_curves,
     file_curves,
 )
-from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
+from biodance.cycles.curves import (
+    CurveGroup,
+    CycleCurve,
+    angle_curves,
+    ground_curves,
+    group_curves,
+    lab_curves,
+    load_curves,
+)
 from biodance.cycles.cut import (
     PERCENT,
     Cycle,
@@ -30,9 +38,7 @@ from biodance.cycles.cut import (
     repetitions,
     replaced_events,
 )
-from biodance.cycles.ground import ground_curves
-from biodance.cycles.jumps import jumps
-from biodance.cycles.lifts import lift
+from biodance.cycles.lifts import jumps, lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
@@ -55,34 +61,17 @@ _WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class TrialMovement:
-    """What moved in one trial.
+    """What moved in one ``trial`` (its name).
 
-    Parameters
-    ----------
-    trial : str
-        Its name.
-    events : tuple of FootEvent
-        Strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where they saw
-        one, else of the markers.
-    cycles : tuple of Cycle
-        Gait cycles of each foot, squats, rises from a chair, jumps.
-    curves : tuple of CycleCurve
-        Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
-        uncertain in them; pelvis, foot progression and centre of mass; envelopes of EMG channels (mV).
-    strides : tuple of Stride
-        Spatio-temporal values of every gait cycle.
-    late : tuple
-        (n,) s arrays for strikes and leavings: how much later the markers tell them than the plates.
-    file_angles, file_events : tuple
-        Ours beside those that another program wrote into the same file.
-    file_curves : tuple of CycleCurve
-        Plug-in gait's own angles over the gait cycles.
-    lifts : tuple of Stride
-        Depth, height, force share of the feet and rise of the force of every squat, rise and jump.
-    shared : tuple of Cycle
-        Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
-    notes : tuple of str
-        What a person should know.
+    ``events`` strikes and leavings of both feet: by hand where session.toml says those of a foot, of the plates where
+    they saw one, else of the markers; ``cycles`` of each foot, squats, rises from a chair, jumps; ``curves`` of every
+    cycle over 0 to 100 %: angles (deg), moments (N·m/kg) and powers (W/kg) with what the parameters leave uncertain in
+    them, pelvis, foot progression and centre of mass, envelopes of EMG channels (mV); ``strides`` spatio-temporal
+    values of every gait cycle; ``late`` (n,) s for strikes and for leavings: how much later the markers tell them than
+    the plates; ``file_angles``, ``file_events`` ours beside those that another program wrote into the same file;
+    ``file_curves`` plug-in gait's own angles over the gait cycles; ``lifts`` depth, height, force share of the feet and
+    rise of the force of every squat, rise and jump; ``shared`` gait cycles in which both feet stood on one plate (there
+    the loads of the leg are not known); ``notes`` what a person should know.
 
     Examples
     --------
@@ -225,26 +214,28 @@ def trial_movement(
     if motion.time.size < 3:
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
-    markers, force = kinematic_events(body, motion), tuple[FootEvent, ...]()
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
-    if contact is not None and feet is not None:
-        force = foot_events(feet, contact)
+    force = foot_events(feet, contact) if contact is not None and feet is not None else ()
+    markers = kinematic_events(body, motion)
     events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    known_of_feet = np.zeros((motion.time.size, 2), dtype=bool) if contact is None else contact.told
+    known_of_feet, shared = _known_feet(contact, motion.time.size)
     jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
     lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*gait_cycles(trial.name, events), *lifts, *jumped)
     cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
-    sure, whole = _fully_measured(contact, motion.time.size), np.asarray(known_of_feet.all(axis=1))
+    whole = np.asarray(known_of_feet.all(axis=1))
+    sure = whole & ~shared
+    on_one = [one for one in cycles if shared[(motion.time >= one.start) & (motion.time <= one.end)].any()]
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
         theirs += file_curves(cycle, outputs, motion.time, own)
         curves += emg_curves(cycle, outputs)
-        if contact is not None and feet is not None:
-            known = _known_loads(cycle, contact)
+        if feet is not None:
+            # in gait the force under a foot does not count while both are on one plate
+            known = known_of_feet & ~shared[:, None] if cycle.kind == "gait" else known_of_feet
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
             curves += ground_curves(cycle, body, motion, soles, feet, known)
     return TrialMovement(
@@ -258,41 +249,27 @@ def trial_movement(
         compare_events(events, outputs),
         tuple(theirs),
         tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
-        tuple(one for one in cycles if one.kind == "gait" and _on_one_plate(one, contact)),
-        _notes(cycles, contact),
+        tuple(one for one in on_one if one.kind == "gait"),
+        _notes(cycles, on_one, contact),
     )
 
 
-def _known_loads(cycle: Cycle, contact: Contact) -> Mask:
-    """Return (T, 2) where the force under each foot counts; in gait not while both feet are on one plate."""
-    return contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
+def _known_feet(contact: Contact | None, frames: int) -> tuple[Mask, Mask]:
+    """Return (T, 2) where the plates tell the force under each foot, nowhere without plates; and (T,) where both feet
+    are on one plate.
+    """
+    if contact is None:
+        return np.zeros((frames, 2), dtype=bool), np.zeros(frames, dtype=bool)
+    return contact.told, np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
 
 
-def _fully_measured(contact: Contact | None, frames: int) -> Mask:
-    """Return (T,) where the plates tell the force under each foot; nowhere without plates."""
-    return np.zeros(frames, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
-
-
-def _on_one_plate(cycle: Cycle, contact: Contact | None) -> bool:
-    """Return whether both feet were on one plate at some time of a cycle."""
-    return contact is not None and bool((_shared(contact) & _inside(cycle, contact)).any())
-
-
-def _shared(contact: Contact) -> Mask:
-    """Return (T,) where both feet are on one plate."""
-    return np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
-
-
-def _inside(cycle: Cycle, contact: Contact) -> Mask:
-    return np.asarray((contact.time >= cycle.start) & (contact.time <= cycle.end))
-
-
-def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+def _notes(cycles: Sequence[Cycle], on_one: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+    """Return what a person should know of the ``cycles``, of which ``on_one`` had both feet on one plate."""
     if not cycles:
         return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
-    if any(np.any(_shared(contact) & _inside(one, contact)) for one in cycles if one.kind != "gait"):
+    if any(one.kind != "gait" for one in on_one):
         return (
             "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
             "difference between left and right moments is not measured.",

@@ -1,4 +1,4 @@
-"""How far a gait lies from a reference of healthy people, in one number: GPS with its MAP, and GDI."""
+"""What healthy people do, in bands, and how far a gait lies from it, in one number: GPS with its MAP, and GDI."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,8 +6,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from biodance.cycles.curves import CycleCurve, NormalCurve
-from biodance.cycles.cut import Cycle
+from biodance.cycles.curves import WHOLE, CurveGroup, CycleCurve, mean_and_sd
+from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.summary import Spread, spread
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, freeze
@@ -23,6 +23,73 @@ _PELVIS = 3
 """The first of `SCORE_ANGLES` are the pelvis': both sides share them."""
 FEATURES = 15
 """Gait features that the index keeps (Schwartz and Rozumalski 2008: 98 % of the variance of their strides)."""
+
+
+_FEWEST_PEOPLE = 3  # People without whom there is no band
+_WRITTEN_EVERY = 5  # % between two values of a band in a file
+
+
+@dataclass(frozen=True, eq=False)
+class NormalCurve:
+    """One quantity over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in ``unit``."""
+
+    kind: str
+    quantity: str
+    unit: str
+    people: int
+    mean: Array
+    sd: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, f"NormalCurve {self.quantity}", mean=WHOLE, sd=WHOLE)
+
+
+def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCurve, ...]:
+    """Return the bands of all quantities that at least `_FEWEST_PEOPLE` have all through the cycle.
+
+    ``people`` by name, with the curves of all their trials; a person's own mean is over trials and sides.
+    """
+    means: dict[tuple[str, str, str], dict[str, list[Array]]] = {}
+    for name, groups in people.items():
+        for one in groups:
+            means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
+    bands = []
+    for (kind, quantity, unit), own in means.items():
+        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
+        if len(whole) >= _FEWEST_PEOPLE:
+            bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
+    return tuple(bands)
+
+
+def normal_toml(bands: Sequence[NormalCurve], table: str = "normal") -> list[str]:
+    """Return the lines of a ``table`` in lab.toml: every fifth per cent; NaN where less than two are known."""
+    lines = []
+    for one in bands:
+        lines += [f'[{table}."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
+        for name, values in (("mean", one.mean), ("sd", one.sd)):
+            row = [f"{v:.4g}" for v in values[::_WRITTEN_EVERY]]
+            half = len(row) // 2
+            lines += [f"{name} = [{', '.join(row[:half])},", f"  {', '.join(row[half:])}]"]
+        lines.append("")
+    return lines
+
+
+def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...]:
+    """Return the bands of ``[normal]``, read from a lab.toml.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        It is not what `normal_toml` writes.
+    """
+    bands = []
+    for name, row in raw.items():
+        kind, quantity = name.split(" ")
+        mean, sd = (
+            np.interp(PERCENT, PERCENT[::_WRITTEN_EVERY], np.asarray(row[key], dtype=float)) for key in ("mean", "sd")
+        )
+        bands.append(NormalCurve(kind, quantity, str(row["unit"]), int(str(row["people"])), mean, sd))
+    return tuple(bands)
 
 
 _Key = TypeVar("_Key", bound=Hashable)

@@ -59,8 +59,12 @@ def strides(
     velocity = np.gradient(centre[:, :2], soles.time, axis=0)
     for one in (one for one in cycles if one.kind == "gait"):
         other_off, other_strike = _other_foot(one, events)
-        values = _values(one, other_off, other_strike, heel, soles.time)
-        values |= _margins(one, other_off, other_strike, heel, soles, centre, velocity)
+        own, first, last = heel[:, SIDES.index(one.side)], *(one.start + p / 100 * one.duration for p in _FLAT)
+        ground = (place_at(own, soles.time, last) - place_at(own, soles.time, first)) / (last - first)
+        ground = ground if np.linalg.norm(ground) > _BELT else np.zeros(2)  # m/s of what the foot stands on
+        stride = place_at(own, soles.time, one.end) - place_at(own, soles.time, one.start) - ground * one.duration
+        values = _values(one, other_off, other_strike, heel, soles.time, ground, stride)
+        values |= _margins(one, other_off, other_strike, own, soles, centre, velocity - ground, stride)
         contact, flight = one.off - one.start, other_strike - one.off
         if flight > 0:
             stiffness = 1e-3 * vertical_stiffness(mass, contact, flight)
@@ -87,27 +91,26 @@ def _margins(
     soles: Soles,
     centre: Array,
     velocity: Array,
+    stride: Array,
 ) -> dict[str, float]:
     """Return by how much the sole reaches beyond the extrapolated centre of mass, m (Hof et al. 2005,
     doi:10.1016/j.jbiomech.2004.03.025): ``margin_aside`` outwards, the least of single support; ``margin_ahead`` along
     the stride, at the strike.
 
     The extrapolated centre is where centre + velocity / root(g / l) lies over the ground, with l the mean distance of
-    the centre of mass from the heel while the foot stands; ``velocity`` (T, 2) m/s of the centre is taken relative to
-    the ground.
+    the centre of mass from the ``heel`` (T, 2) m while the foot stands; ``velocity`` (T, 2) m/s of the centre and the
+    ``stride`` (2,) m are relative to the ground.
     """
     foot, time = SIDES.index(cycle.side), soles.time
-    ground = _ground(cycle, heel[:, foot], time)
-    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
-    stride, stands = end - start - ground * cycle.duration, (time >= cycle.start) & (time <= cycle.off)
+    stands = (time >= cycle.start) & (time <= cycle.off)
     if not stands.any() or not np.linalg.norm(stride) > 0:
         return {}
     along = stride / np.linalg.norm(stride)
     outwards = np.array([along[1], -along[0]]) * (1.0 if cycle.side == "right" else -1.0)
-    from_heel = centre[stands] - np.column_stack([heel[stands, foot], soles.outline[stands, foot, :, 2].min(axis=1)])
+    from_heel = centre[stands] - np.column_stack([heel[stands], soles.outline[stands, foot, :, 2].min(axis=1)])
     pendulum = np.sqrt(np.linalg.norm(from_heel, axis=1).mean() / STANDARD_GRAVITY)
     near = cycle.frames(time)
-    beyond = centre[near, :2] + pendulum * (velocity[near] - ground)
+    beyond = centre[near, :2] + pendulum * velocity[near]
     aside, ahead = ((soles.outline[near, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
     margins = {"margin_ahead": float(np.interp(cycle.start, time[near], ahead))}
     single = (time[near] >= other_off) & (time[near] <= other_strike)
@@ -135,12 +138,10 @@ def _other_foot(cycle: Cycle, events: Sequence[FootEvent]) -> tuple[float, float
     return before[0] if len(before) == 1 else np.nan, strike
 
 
-def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array) -> dict[str, float]:
-    foot = SIDES.index(cycle.side)
-    ground = _ground(cycle, heel[:, foot], time)
-    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
-    stride = end - start - ground * cycle.duration
-    length = float(np.linalg.norm(stride))
+def _values(
+    cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array, ground: Array, stride: Array
+) -> dict[str, float]:
+    foot, length = SIDES.index(cycle.side), float(np.linalg.norm(stride))
     values = {
         "cadence": 120.0 / cycle.duration,
         "speed": length / cycle.duration,
@@ -150,7 +151,8 @@ def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, ti
     if np.isfinite(cycle.off):
         values["stance"] = cycle.off_percent
     if np.isfinite(other_strike) and length > 0:
-        across = end - place_at(heel[:, 1 - foot], time, other_strike) - ground * (cycle.end - other_strike)
+        across = place_at(heel[:, foot], time, cycle.end) - place_at(heel[:, 1 - foot], time, other_strike)
+        across -= ground * (cycle.end - other_strike)
         along = stride / length
         values["step_time"] = cycle.end - other_strike
         values["step_length"] = float(across @ along)
@@ -158,13 +160,6 @@ def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, ti
         values["step_width"] = to_right if cycle.side == "right" else -to_right
     double = other_off - cycle.start + max(0.0, cycle.off - other_strike)
     return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
-
-
-def _ground(cycle: Cycle, heel: Array, time: Array) -> Array:
-    """Return the velocity (2,) m/s of what the foot stands on; zero for a floor."""
-    first, last = (cycle.start + share / 100 * cycle.duration for share in _FLAT)
-    velocity = (place_at(heel, time, last) - place_at(heel, time, first)) / (last - first)
-    return velocity if np.linalg.norm(velocity) > _BELT else np.zeros(2)
 
 
 def place_at(path: Array, time: Array, when: float) -> Array:

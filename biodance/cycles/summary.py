@@ -15,7 +15,7 @@ from biodance.cycles.keys import KeyValue, key_values
 from biodance.cycles.lifts import LIFT_UNITS
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import STRIDE_UNITS, Stride, mean_values
-from biodance.records import SIDES, Array
+from biodance.records import SIDES
 from biodance.uncertainty.visits import change_of_mean, visit_mean
 
 _TURNS = 20.0
@@ -238,12 +238,8 @@ def _counted(some: Iterable[Iterable[_Of]], kind: str, turned: Sequence[Cycle]) 
 def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
     """Return the gait cycles during which the pelvis turns."""
     curves = [one for trial in trials for one in trial.curves if one.quantity == "pelvis_rotation"]
-    return [one.cycle for one in curves if one.cycle.kind == "gait" and _turns(one.value)]
-
-
-def _turns(rotation: Array) -> bool:
-    ends = rotation[np.isfinite(rotation)]
-    return bool(ends.size and abs((ends[-1] - ends[0] + 180) % 360 - 180) > _TURNS)
+    known = [(one.cycle, one.value[np.isfinite(one.value)]) for one in curves if one.cycle.kind == "gait"]
+    return [cycle for cycle, way in known if way.size and abs((way[-1] - way[0] + 180) % 360 - 180) > _TURNS]
 
 
 def _same(curves: Iterable[CycleCurve]) -> Iterable[list[CycleCurve]]:

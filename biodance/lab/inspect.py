@@ -12,14 +12,14 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
-from biodance.lab.markers.signals import MarkerGaps, report_gaps
+from biodance.lab.markers.signals import report_gaps
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.corners import Told
 from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.records import Markers, Plate, Trial
+from biodance.records import Plate, Trial
 from biodance.settings import COP_FORCE
 
 _KEYS = (
@@ -103,8 +103,8 @@ def inspect_file(
     except BiodanceError as error:
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)
-    gaps = report_gaps(of_set) if (of_set := _of_the_set(trial)) is not None else ()
-    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed, *_never_seen(gaps)]
+    gap, never = _gaps(trial)
+    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed, *never]
     plates = [_plate(plate) for plate in trial.plates]
     clocks = [*([trial.markers.time] if trial.markers else ()), *(plate.wrench.time for plate in trial.plates)]
     as_read = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]
@@ -120,7 +120,7 @@ def inspect_file(
         "markers": list(trial.markers.names) if trial.markers is not None else [],
         "marker_set": trial.worn or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
-        "gaps_percent": _mean_gap(gaps),
+        "gaps_percent": gap,
         "subjects": _subjects(path),
         "plates": plates,
         "mean_vertical_n": float(sum(as_read)) if as_read else None,
@@ -132,16 +132,18 @@ def inspect_file(
     }
 
 
-def _never_seen(gaps: Sequence[MarkerGaps]) -> list[str]:
-    """Say which markers were never seen, if any."""
-    never = [gap.label for gap in gaps if gap.percent >= 100.0]
-    return [f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}."] if never else []
-
-
-def _mean_gap(gaps: Sequence[MarkerGaps]) -> float | None:
-    """Return the mean share of gaps, per cent, of the markers that were seen at all; None without one."""
+def _gaps(trial: Trial) -> tuple[float | None, list[str]]:
+    """Return the mean share of gaps, per cent, of the set's markers (of all, without a set) that were seen at all, None
+    without one; and a sentence about those that never were.
+    """
+    if trial.markers is None:
+        return None, []
+    worn = read_marker_set(trial.marker_set) if trial.marker_set else None
+    gaps = report_gaps(canonical(trial.markers, worn) if worn else trial.markers)
     hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
-    return float(np.mean(hidden)) if hidden else None
+    never = [gap.label for gap in gaps if gap.percent >= 100.0]
+    said = [f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}."] if never else []
+    return float(np.mean(hidden)) if hidden else None, said
 
 
 def _guessed(trial: Trial) -> tuple[Trial, list[str]]:
@@ -183,13 +185,6 @@ def _plate(plate: Plate) -> dict[str, Any]:
         "cop_m": [_number(x) for x in loaded.mean(axis=0)] if stepped_on else None,
         "decisions": list(plate.decisions),
     }
-
-
-def _of_the_set(trial: Trial) -> Markers | None:
-    """Return the markers that belong to the recognised set; all of them where no set was recognised."""
-    if trial.markers is None or not trial.marker_set:
-        return trial.markers
-    return canonical(trial.markers, read_marker_set(trial.marker_set))
 
 
 def _number(value: float) -> float | None:

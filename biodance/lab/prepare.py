@@ -54,6 +54,7 @@ class LowPass:
         wanted = float(np.tan(np.pi * self.cutoff / rate))
         if self.kind == "critically_damped":
             return wanted / float(np.sqrt(2 ** (0.5 / self.order) - 1))
+        # both passes: 1 / (1 + r^(2 n)) = 1 / sqrt(2) at the wanted frequency, r relative to the designed one
         return wanted * float((np.sqrt(2) - 1) ** (-0.5 / self.order))
 
     def shortest(self, rate: float) -> int:

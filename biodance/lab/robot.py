@@ -58,19 +58,14 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     twice = sorted({name for name in joints if joints.count(name) > 1})
     if twice:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
-    notes = ("Angles were converted from degrees.",) if (factors != 1).any() else ()
-    return Encoders(time, joints, values[:, columns] * factors, (*cells.said[1:], *notes, *_lost(time)))
-
-
-def _lost(time: Array) -> tuple[str, ...]:
-    """Return in words where samples are missing; nothing where the clock runs on."""
+    notes = [*cells.said[1:], *["Angles were converted from degrees."] * bool((factors != 1).any())]
     steps = np.diff(time)
     late = np.flatnonzero(steps > _LATE * np.median(steps))
-    if not late.size:
-        return ()
-    others = late.size - 1
-    first, places = float(time[late[0]]), f" and at {others} other place{'s' * (others > 1)}" if others else ""
-    return (f"Samples are missing after {first:.3f} s{places}: up to {steps.max():.3g} s without one.",)
+    if late.size:
+        others = f" and at {late.size - 1} other place{'s' * (late.size > 2)}" if late.size > 1 else ""
+        first = f"Samples are missing after {time[late[0]]:.3f} s{others}"
+        notes.append(f"{first}: up to {steps.max():.3g} s without one.")
+    return Encoders(time, joints, values[:, columns] * factors, tuple(notes))
 
 
 def _factor(path: Path, column: str, unit: str) -> float:
@@ -135,10 +130,10 @@ def for_joints(
             f"URDF lets it go from {low[worst]:.2f} to {high[worst]:.2f}. Are columns swapped, signs turned, or in "
             f"other units?"
         )
-    ignored = [name for name in found.joints if name not in joints]
-    notes = (f"Columns that are no joint of the robot were left: {', '.join(ignored)}.",) if ignored else ()
-    still = (f"Taken as not moving: {', '.join(fixed)}.",) if fixed else ()
-    return Encoders(found.time, joints, angle, (*found.notes, *notes, *still))
+    ignored, notes = [name for name in found.joints if name not in joints], list(found.notes)
+    notes += [f"Columns that are no joint of the robot were left: {', '.join(ignored)}."] if ignored else []
+    notes += [f"Taken as not moving: {', '.join(fixed)}."] if fixed else []
+    return Encoders(found.time, joints, angle, tuple(notes))
 
 
 _FILE = "recording.toml"
@@ -248,15 +243,11 @@ def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[P
             raise SessionRefused(
                 f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role."
             )
-        role = entry.get("role", _role(name))
+        role = entry.get("role", "validate" if _KEPT.search(name) else "fit")
         refuse_unknown("trial role", role, ROLES)
         if role != "skip":
             found[name] = (cast(Role, role), (folder / entry["encoders"], folder / entry["plate"]))
     return found
-
-
-def _role(name: str) -> Role:
-    return "validate" if _KEPT.search(name) else "fit"
 
 
 def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path, Path]]]:
@@ -270,11 +261,11 @@ def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path,
             f"{folder}: holds no {lacks}; there are {', '.join(path.name for path in files[:8]) or 'no files'}. A "
             f"recording is a CSV or Parquet file of encoders and a C3D, AMTI or CSV file of the plate."
         )
-    if len(tables) == len(plates) == 1:
-        pairs = [(tables[0], plates[0])]
-    else:
-        pairs = [(table, _plate_of(table, plates)) for table in tables]
-    return {(name := _stem(table)): (_role(name), (table, plate)) for table, plate in pairs}
+    alone = len(tables) == len(plates) == 1
+    pairs = [(table, plates[0] if alone else _plate_of(table, plates)) for table in tables]
+    return {
+        (name := _stem(table)): ("validate" if _KEPT.search(name) else "fit", (table, plate)) for table, plate in pairs
+    }
 
 
 def _plate_of(table: Path, plates: list[Path]) -> Path:

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from biodance.cycles.curves import NormalCurve, normal_of
-from biodance.cycles.scores import DeviationReference, deviation_of
+from biodance.cycles.scores import DeviationReference, NormalCurve, deviation_of, normal_of
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.corrections import (

@@ -10,8 +10,15 @@ import numpy as np
 
 from biodance import display
 from biodance.cycles.beside import EMG
-from biodance.cycles.curves import CurveGroup, NormalCurve, normal_curves
-from biodance.cycles.scores import FEATURES, DeviationReference, deviation_reference, gait_vectors
+from biodance.cycles.curves import CurveGroup
+from biodance.cycles.scores import (
+    FEATURES,
+    DeviationReference,
+    NormalCurve,
+    deviation_reference,
+    gait_vectors,
+    normal_curves,
+)
 from biodance.diagnosis.archive.norms import (
     Norm,
     SeenValue,

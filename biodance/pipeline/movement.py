@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
-from biodance.cycles.curves import NormalCurve
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.scores import DeviationReference, GaitScores, gait_scores
+from biodance.cycles.scores import DeviationReference, GaitScores, NormalCurve, gait_scores
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError

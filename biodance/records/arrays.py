@@ -103,6 +103,17 @@ def rate_of(time: Array) -> float:
     return float((time.size - 1) / (time[-1] - time[0])) if time.size > 1 else float("nan")
 
 
+class Sampled:
+    """What has a ``time`` (n,) s."""
+
+    time: Array
+
+    @property
+    def rate(self) -> float:
+        """Mean sampling rate, Hz; NaN for fewer than two samples."""
+        return rate_of(self.time)
+
+
 def by_name(trials: Iterable[_Named], name: str, kind: str) -> _Named:
     """Return the first of ``trials`` of that ``name``; UnknownName lists all where there is none."""
     some = tuple(trials)

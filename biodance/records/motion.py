@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.errors import BiodanceError, known_index
-from biodance.records.arrays import Array, assign, check_time, freeze, frozen_array, in_time, rate_of, runs, span
+from biodance.records.arrays import Array, Sampled, assign, check_time, freeze, frozen_array, in_time, runs, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Encoders:
+class Encoders(Sampled):
     """Joint angles over time, on the robot's own clock.
 
     Parameters
@@ -41,11 +41,6 @@ class Encoders:
         time = check_time(self.time, "Encoders")
         angle = frozen_array(self.angle, (time.size, len(self.joints)), "Encoders.angle")
         assign(self, time=time, joints=tuple(self.joints), angle=angle, notes=tuple(self.notes))
-
-    @property
-    def rate(self) -> float:
-        """Hz, mean."""
-        return rate_of(self.time)
 
 
 BY_FRAME = ("time", "q", "v", "a", "residual", "determined", "state")
@@ -79,7 +74,7 @@ class AngleSpan:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Sampled):
     """Generalised motion of a body, in Pinocchio's order.
 
     Parameters
@@ -181,11 +176,6 @@ class Motion:
         100
         """
         return Motion(self.time[frames], self.q[frames], self.v[frames], self.a[frames])
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz; NaN for fewer than two frames."""
-        return rate_of(self.time)
 
     @property
     def angles(self) -> Array:

@@ -17,13 +17,13 @@ from biodance.records.arrays import (
     CHANNEL_TITLES,
     CHANNELS,
     Array,
+    Sampled,
     any_coordinate,
     assign,
     check_time,
     freeze,
     frozen_array,
     in_time,
-    rate_of,
     span,
 )
 from biodance.settings import COP_FORCE
@@ -113,7 +113,7 @@ class FootEvent:
 
 
 @dataclass(frozen=True, eq=False)
-class Markers:
+class Markers(Sampled):
     """Marker trajectories in the lab frame.
 
     Parameters
@@ -164,11 +164,6 @@ class Markers:
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table().describe())
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz; NaN for fewer than two frames."""
-        return rate_of(self.time)
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
@@ -260,7 +255,7 @@ class Markers:
 
 
 @dataclass(frozen=True, eq=False)
-class Wrench:
+class Wrench(Sampled):
     """Force and moment of the ground ON the subject, about the lab origin.
 
     Parameters
@@ -296,11 +291,6 @@ class Wrench:
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table().describe())
-
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz; NaN for fewer than two samples."""
-        return rate_of(self.time)
 
     @property
     def force(self) -> Array:

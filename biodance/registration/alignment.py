@@ -202,6 +202,7 @@ class _Samples:
         weight = 1.0 / (1.0 + self.lift / _OUTLIER) ** 2
         for _ in range(_ROUNDS):
             centre, needed = (np.sum(weight * x) / weight.sum() for x in (self.cop, self.needed_cop))
+            # the argument of sum conj(a) b is the turn that carries a onto b
             both = np.sum(weight * np.conj(self.cop - centre) * (self.needed_cop - needed)) / _PRESSURE**2
             both += np.sum(weight * np.conj(self.shear) * self.needed_shear) / _SHEAR**2
             turn = complex(np.exp(1j * np.angle(both)))

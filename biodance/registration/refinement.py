@@ -140,13 +140,14 @@ class PoseEvidence:
         """Return the same with the covariance ``added`` (4, 4) of what its model does not know."""
         covariance = np.linalg.pinv(self.information)
         change = covariance @ self.vector
-        wider = np.linalg.inv(covariance + added)
+        wider = np.linalg.inv(covariance + added)  # the change itself stays as it is
         return PoseEvidence(np.asarray(wider), wider @ change, self.misfit, self.rows)
 
 
 def together(pulls: Iterable[PoseEvidence]) -> tuple[Array, Array]:
     """Return the change (4,) of the pose that all evidence asks for, and its covariance (4, 4)."""
     some = tuple(pulls)
+    # independent evidence of one change: informations and vectors add up
     covariance = np.linalg.inv(np.sum([one.information for one in some], axis=0))
     return covariance @ np.sum([one.vector for one in some], axis=0), covariance
 
@@ -190,6 +191,7 @@ def _columns(case: Case, about: Array) -> Array:
     out[:, 3:, 0] = cross(np.array([[1.0, 0.0, 0.0]]), force)
     out[:, 3:, 1] = cross(np.array([[0.0, 1.0, 0.0]]), force)
     near = wrench_about_point(wrench, about)
+    # a small turn about the vertical through `about`: both vectors change by e_z x themselves
     turned = np.concatenate([cross(up, near[:, :3]), cross(up, near[:, 3:])], axis=1)
     out[:, :, 2] = wrench_about_origin(turned, about)
     out[:, :, 3] = np.gradient(wrench, case.motion.time, axis=0)
@@ -219,7 +221,7 @@ def feet_pull(steps: tuple[PlateStep, ...], about: Array) -> PoseEvidence | None
     value, slope = np.array([row.value for row in rows]), np.array([row.slope for row in rows])
     covariance = np.diag([row.own**2 for row in rows])
     for i, one in enumerate(rows):
-        for j, other in enumerate(rows):
+        for j, other in enumerate(rows):  # two rows covary by the product of the sds that they share
             covariance[i, j] += sum(sd * other.shared.get(key, 0.0) for key, sd in one.shared.items())
     weight = np.linalg.inv(covariance)
     information, vector = slope.T @ weight @ slope, -slope.T @ weight @ value

@@ -278,6 +278,7 @@ def _placed(plate: Plate, loaded: bool, found: Refined) -> PlacedPlate:
     """Return one plate in the room with the intervals at its own centre."""
     centre = found.pose.points(plate.centre)
     x, y = (centre - found.about)[:2]
+    # by how much the plate's own centre moves with x, y, yaw and delay of the pose
     slope = np.array([[1.0, 0.0, -y, 0.0], [0.0, 1.0, x, 0.0]])
     flat = np.sqrt(np.diag(slope @ found.covariance @ slope.T))
     right = found.pose.points(plate.corners)

@@ -13,8 +13,7 @@ import re
 
 from rich.console import Console
 
-from biodance.cycles.curves import normal_toml
-from biodance.cycles.scores import deviation_toml
+from biodance.cycles.scores import deviation_toml, normal_toml
 from biodance.pipeline.lab_file import PLUG_IN_GAIT
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.report.plates import print_left_out

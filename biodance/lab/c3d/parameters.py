@@ -6,7 +6,7 @@ the next record``; data section. Three byte orders: Intel (84), DEC (85) and SGI
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -132,15 +132,11 @@ def read_parameters(content: bytes, header: Header, where: str) -> tuple[Paramet
     """
     names: dict[int, str] = {}
     records: list[tuple[int, str, ParameterValue]] = []
-    at = header.parameter_start + 4
-    while at + 2 <= header.data_start and content[at] != 0 and content[at + 1] != 0:
-        at, group, name, value = _record(content[: header.data_start], at, header.processor, where)
+    for _, number, name, value in _records(content, header, where):
         if value is None:
-            names[group] = name
+            names[number] = name
         else:
-            records.append((group, name, value))
-        if at == 0:
-            break
+            records.append((number, name, value))
     groups: dict[str, dict[str, ParameterValue]] = {name: {} for name in names.values()}
     twice: dict[tuple[str, str], list[ParameterValue]] = {}
     for number, name, value in records:
@@ -154,7 +150,9 @@ def read_parameters(content: bytes, header: Header, where: str) -> tuple[Paramet
 
 def _left_out(known: dict[str, ParameterValue], group: str, name: str, values: list[ParameterValue], where: str) -> str:
     """Settle in its group, which is ``known``, a parameter with several ``values``; return the sentence about it."""
-    twice = f"parameter {group}:{name} is there twice, as {' and as '.join(map(_short, values))}"
+    listed = [value if isinstance(value, list) else np.ravel(value, order="F") for value in values]
+    short = (", ".join(str(one) for one in some[:4]) for some in listed)
+    twice = f"parameter {group}:{name} is there twice, as {' and as '.join(short)}"
     if name.rstrip("0123456789") in _NEEDED.get(group, ()):
         raise FileRefused(
             f"{where}: {twice}, and the file cannot be read without it. Delete the wrong one, for example in Mokka or "
@@ -174,10 +172,6 @@ def _same(one: ParameterValue, other: ParameterValue) -> bool:
     return one.dtype.kind == other.dtype.kind and np.array_equal(one, other)
 
 
-def _short(value: ParameterValue) -> str:
-    return ", ".join(str(one) for one in (value if isinstance(value, list) else np.ravel(value, order="F"))[:4])
-
-
 def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, int]]:
     """Return byte position and width of every label of a point: POINT:LABELS and its continuations LABELS2,
     LABELS3 ...
@@ -187,23 +181,26 @@ def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, in
     FileRefused
         As `read_parameters`.
     """
-    numbers: dict[int, str] = {}
-    found: list[tuple[int, int, bytes]] = []
+    records = list(_records(content, header, where))
+    points = [number for _, number, name, value in records if value is None and name == "POINT"]
+    rows = []
+    for at, number, name, value in records:
+        if number not in points or not isinstance(value, list) or name.rstrip("0123456789") != "LABELS":
+            continue
+        kind = at + 2 + abs(int(np.int8(np.uint8(content[at])))) + 2  # byte of the type, then that of the dimensions
+        first = kind + 2 + content[kind + 1]
+        width, *counts = content[kind + 2 : first] or (0,)
+        rows += [(first + i * width, width) for i in range(math.prod(counts))] if content[kind + 1] else []
+    return rows
+
+
+def _records(content: bytes, header: Header, where: str) -> Iterator[tuple[int, int, str, ParameterValue | None]]:
+    """Yield byte position, group number, name and value (None = a group) of every record of the parameter section."""
     section, at = content[: header.data_start], header.parameter_start + 4
     while at and at + 2 <= header.data_start and section[at] != 0 and section[at + 1] != 0:
         here = at
-        at, number, word, value = _record(section, here, header.processor, where)
-        if value is None:
-            numbers[number] = word
-        elif isinstance(value, list) and word.rstrip("0123456789") == "LABELS":
-            first = here + 2 + abs(int(np.int8(np.uint8(section[here])))) + 2
-            found.append((number, first, section[first : first + 2 + section[first + 1]]))
-    rows = []
-    for number, first, head in found:
-        if numbers.get(number) == "POINT" and head[1] >= 1:
-            width, count = head[2], math.prod(head[3:])
-            rows += [(first + len(head) + i * width, width) for i in range(count)]
-    return rows
+        at, number, name, value = _record(section, here, header.processor, where)
+        yield here, number, name, value
 
 
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:

@@ -80,16 +80,7 @@ def second_opinion(path: Path, numbers: _Numbers, layout: Layout) -> str:
     ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of
     them without looking at the length of the file, as biodance does: no judgement. Left out are analog channels that
     ezc3d 1.7.2 is known to read wrong: those with a negative OFFSET, whose sign it loses, and unsigned integers, which
-    it takes for signed ones.
-
-    Parameters
-    ----------
-    path
-        The file.
-    numbers
-        Points (T, K, 3) in file units, NaN = not seen, and analog (S, C), as biodance read them.
-    layout
-        How biodance understood the data section.
+    it takes for signed ones. ``numbers`` and ``layout`` as biodance read them.
     """
     try:
         child = run_python("-c", READ, str(path), timeout=_PATIENCE)
@@ -111,20 +102,12 @@ def second_opinion(path: Path, numbers: _Numbers, layout: Layout) -> str:
             f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, "
             f"{len(points)} frames)"
         )
-    return "confirmed" if _same_points(numbers[0], points) and _same_analog(numbers[1], analog, layout) else "refuted"
-
-
-def _same_points(ours: Array, theirs: Array) -> bool:
-    """Compare where biodance saw a point; where it did not, ezc3d may give any number."""
-    seen = np.isfinite(ours)
-    return ours.shape == theirs.shape and _same(ours[seen], theirs[seen])
-
-
-def _same_analog(ours: Array, theirs: Array, layout: Layout) -> bool:
+    seen = np.isfinite(numbers[0])  # where biodance saw no point, ezc3d may give any number
+    same = points.shape == seen.shape and _same(numbers[0][seen], points[seen])
     judged = layout.offset >= 0
-    if not ours.size or not judged.any() or (layout.unsigned and not layout.floating):
-        return True
-    return ours.shape == theirs.shape and _same(ours[:, judged], theirs[:, judged])
+    if numbers[1].size and judged.any() and (layout.floating or not layout.unsigned):
+        same = same and analog.shape == ours[1] and _same(numbers[1][:, judged], analog[:, judged])
+    return "confirmed" if same else "refuted"
 
 
 def _same(one: Array, other: Array) -> bool:
@@ -296,7 +279,7 @@ class RawC3d:
 
     @cached_property
     def nameless(self) -> frozenset[int]:
-        """The columns of points without a name (`_unlabelled`)."""
+        """The columns of points without a name (`_UNLABELLED`)."""
         return frozenset(_unlabelled(self.labels))
 
 

@@ -95,7 +95,8 @@ def write_c3d(
     path = Path(path)
     samples = _samples(path, markers, plates, analog_rate)
     points = _points(markers, len(plates[0].channels) if markers is None and plates else 0)
-    analog = np.concatenate([np.empty((len(points) * samples, 0)), *map(_on_disk, plates)], axis=1)
+    scaled = (plate.channels * [_DISK[kind][0] for kind in _CHANNEL_KINDS[plate.type]] for plate in plates)
+    analog = np.concatenate([np.empty((len(points) * samples, 0)), *scaled], axis=1)
     if not np.isfinite(analog).all():
         row, column = np.argwhere(~np.isfinite(analog))[0]
         raise BiodanceError(
@@ -150,10 +151,6 @@ def _points(markers: Markers | None, frames: int) -> Array:
     points[..., :3] = np.where(markers.seen[..., None], _MM * markers.xyz, 0.0)
     points[..., 3] = np.where(markers.seen, 0.0, -1.0)
     return points
-
-
-def _on_disk(plate: PlateRecording) -> Array:
-    return plate.channels * [_DISK[kind][0] for kind in _CHANNEL_KINDS[plate.type]]
 
 
 def _words(number: int) -> Array:

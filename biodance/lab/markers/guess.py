@@ -124,7 +124,9 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
             inverse = np.linalg.inv(cov[np.ix_(have, have)] + bound("glued") ** 2 * np.eye(len(have)))
             off = x[[known[places[k]] for k in have], have] - mean[have]
             off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
+            # what all others tell of a known one: x_i - mu_i(others) = (C^-1 off)_i / (C^-1)_ii
             left_out = off - inverse @ off / np.diag(inverse)
+            # conditional mean and variance of a Gaussian, given the known ones
             mean += cov[:, have] @ inverse @ off
             variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
             mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)

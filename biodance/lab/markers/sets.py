@@ -291,22 +291,17 @@ def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
-def _is_weight(value: Any) -> bool:
-    return _number(value) and value >= 0
-
-
 def _three(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 3
 
 
-def _is_offset(value: Any) -> bool:
-    return _three(value) and all(map(_number, value))
-
-
 _MARKER_VALUES: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "weight": (_is_weight, "a number >= 0"),
+    "weight": (lambda value: _number(value) and value >= 0, "a number >= 0"),
     "corner_of": (_three, "the three labels of an alignment device"),
-    "offset": (_is_offset, "three numbers [x, y, z] (anterior, up, right)"),
+    "offset": (
+        lambda value: _three(value) and all(map(_number, value)),
+        "three numbers [x, y, z] (anterior, up, right)",
+    ),
 }
 """What the entries of a marker that are no words must be, and how that is said."""
 

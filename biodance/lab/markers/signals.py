@@ -192,6 +192,7 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
     a, b, c, d = (xyz[at : at + count] for at in (0, 1, frames + 2, frames + 3))
     least = np.full(a.shape[:-1], np.inf)
     for k in range(frames):
+        # Lagrange's weights of the cubic through the four places, at k
         weight = [np.prod((k - places[places != one]) / (one - places[places != one])) for one in places]
         way = weight[0] * a + weight[1] * b + weight[2] * c + weight[3] * d
         line = b + (k + 1) / (frames + 1) * (c - b)

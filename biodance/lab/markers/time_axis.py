@@ -91,7 +91,7 @@ class TimeAxis:
         expected = np.zeros_like(columns[2:-2])
         for k, shift in enumerate((0, 1, 3, 4)):
             others = np.delete(around, k, axis=0)
-            weight = np.prod((at - others) / (around[k] - others), axis=0)
+            weight = np.prod((at - others) / (around[k] - others), axis=0)  # Lagrange's
             expected += weight[:, None] * columns[shift : len(columns) - 4 + shift]
         inner = np.ptp(around, axis=0) < 4 * _HOLE * np.median(np.diff(self.stamps))
         off = (expected - columns[2:-2])[inner]
@@ -238,6 +238,7 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     tried = np.arange(gathered.size) / (count * _TICK)
     legal = np.flatnonzero((tried > 1.5 * rate) & (tried < _HIGHEST))
     best = legal[int(np.argmax(np.abs(gathered[legal])))]
+    # |sum of share exp(i phase)|² of random phases is exponential with the mean sum(share²); so many rates were tried
     chance = legal.size * np.exp(-(np.abs(gathered[best]) ** 2) / np.sum(share**2))
     if chance > _CHANCE:
         return None

@@ -19,6 +19,7 @@ _UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its cl
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 _SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
 _UNITS = {"m": 1.0, "mm": 0.001}
+_FOOT = 0.15  # m that a foot reaches beyond its markers and centres of pressure
 
 
 def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
@@ -98,11 +99,22 @@ def half_sides(corners: Array) -> Array:
     return np.linalg.norm(_along_sides(corners), axis=1) / 4
 
 
+def around_pressures(points: Array, height: float) -> Array:
+    """Return the corners (4, 3) m around ``points`` (n, 2 or more) m with room for a foot, at a ``height`` m;
+    counter-clockwise seen from above.
+    """
+    (x0, y0), (x1, y1) = np.nanmin(points, axis=0)[:2] - _FOOT, np.nanmax(points, axis=0)[:2] + _FOOT
+    return np.array([[x1, y1, height], [x0, y1, height], [x0, y0, height], [x1, y0, height]])
+
+
 def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
     """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-    spans = {name: (unit * sides.min(), unit * sides.max()) for name, unit in _UNITS.items()}
-    fits = [name for name, (least, most) in spans.items() if least >= SHORTEST_SIDE and most <= LONGEST_SIDE]
+    fits = [
+        name
+        for name, unit in _UNITS.items()
+        if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE
+    ]
     if any(np.isclose(_UNITS[name], metres) for name in fits) or len(fits) != 1:
         return metres, []
     said = (
@@ -156,7 +168,8 @@ def _point(p: Array) -> str:
     return "(" + ", ".join(f"{c:.4g}" for c in p) + ")"
 
 
-_C3D_ONLY = ("type", "channels", "sensitivity", "origin_m")
+C3D_ONLY = ("type", "channels", "sensitivity", "origin_m")
+"""What of a plate only a reader of its channels can follow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +232,7 @@ def as_told(trial: Trial, told: Told) -> Trial:
         if not said.use:
             history.append(f"{plate.name} was left out, as session.toml says.")
             continue
-        idle = [key for key in said.keys if key in _C3D_ONLY]
+        idle = [key for key in said.keys if key in C3D_ONLY]
         if idle:
             warnings.append(f"{plate.name}: {', '.join(idle)} of session.toml can be followed in C3D files only.")
         done = plate if said.corners is None else _placed(plate, said.corners)
@@ -228,12 +241,8 @@ def as_told(trial: Trial, told: Told) -> Trial:
             done = replace(done, foot=said.foot, decisions=(*done.decisions, f"{taken[0].upper()}{taken[1:]}"))
             history.append(f"{plate.name}: {taken}")
         plates.append(done)
-    return replace(
-        trial,
-        plates=tuple(plates),
-        history=(*trial.history, *history),
-        warnings=(*trial.warnings, *warnings),
-    )
+    history, warnings = [*trial.history, *history], [*trial.warnings, *warnings]
+    return replace(trial, plates=tuple(plates), history=tuple(history), warnings=tuple(warnings))
 
 
 def _placed(plate: Plate, corners: Array) -> Plate:
@@ -287,6 +296,5 @@ def _moved(plate: Plate, place: dict[str, Array]) -> Plate:
     if plate.put is None or plate.name not in place:
         return plate
     shift = np.array([*(place[plate.name] - plate.put), 0.0])
-    value = np.hstack([plate.wrench.force, plate.wrench.moment + np.cross(shift, plate.wrench.force)])
-    moved = Wrench(plate.wrench.time, value)
-    return replace(plate, corners=plate.corners + shift, wrench=moved, put=place[plate.name])
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(plate.wrench.value, shift))
+    return replace(plate, corners=plate.corners + shift, wrench=wrench, put=place[plate.name])

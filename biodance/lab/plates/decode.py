@@ -5,7 +5,7 @@ Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Vi
 types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -66,26 +66,12 @@ class Decisions:
 class PlateReading:
     """A plate whose directions are not yet decided.
 
-    Attributes
-    ----------
-    plate : PlateParameters
-        What the file says.
-    corners, axes, half : Array
-        (4, 3) m in the lab frame; lab_R_plate (3, 3); half the sides (2,) m along the plate's x and y.
-    sensor : Array
-        (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero taken off.
-    vector : Array
-        (3,) m from the sensor to the centre of the surface, plate axes, as the file says.
-    rate : float
-        Hz of the samples.
-    empty : Array
-        (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded.
-    known : Array
-        (S,) False where a channel holds no number; ``sensor`` then keeps the nearest known sample, for decisions only.
-    decisions : Decisions
-        What was decided.
-    warnings : tuple of str
-        What a person should look at, beside odd corners, origins and gaps.
+    ``plate`` what the file says; ``corners`` (4, 3) m in the lab frame; ``axes`` lab_R_plate (3, 3); ``half`` the sides
+    (2,) m along the plate's x and y; ``sensor`` (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero
+    taken off; ``vector`` (3,) m from the sensor to the centre of the surface, plate axes, as the file says; ``rate``
+    Hz; ``empty`` (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded; ``known`` (S,)
+    False where a channel holds no number (``sensor`` keeps the nearest known sample, for decisions only); what was
+    decided, step by step, and ``warnings`` beside odd corners, origins and gaps.
     """
 
     plate: PlateParameters
@@ -119,67 +105,39 @@ class _Geometry(NamedTuple):
     origin_said: tuple[str, ...]
 
 
-class _DecodedPlates(NamedTuple):
-    """The ``readings`` of a file's plates, why others are ``refused`` by number, and ``warnings``."""
-
-    readings: list[PlateReading]
-    refused: dict[int, str]
-    warnings: tuple[str, ...]
-
-
 def decode_plates(
     raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
-) -> _DecodedPlates:
-    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
+) -> tuple[list[PlateReading], dict[int, str], tuple[str, ...]]:
+    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already; by number why
+    others are refused; and warnings.
 
     Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
     not applied where with it the plates carry less than half or more than twice the weight, and without it, within
     15 %, all of it.
 
-    Parameters
-    ----------
-    raw : RawC3d
-        The file.
-    plates : sequence of PlateParameters
-        What it says of each plate.
-    metres : float
-        The file's length unit in m.
-    turn : Array
-        (3, 3), from file axes to the lab.
-    mass : float or None
-        kg of the person, None = not known.
-
-    Returns
-    -------
-    DecodedPlates
-        A plate is refused whose corners, ORIGIN or channels make no sense; the sentence says which value and what
-        would be legal.
+    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab, ``mass`` kg of the
+    person, None = not known. A plate is refused whose corners, ORIGIN or channels make no sense; the sentence says
+    which value and what would be legal.
     """
-    placed, refused = [], {}
-    for plate in plates:
-        try:
-            placed.append((plate, _geometry(plate, metres, turn)))
-        except TrialRefused as error:
-            refused[plate.number] = str(error)
-    done, lost = _decode_each(raw, placed, refused)
+    done, lost = _decode_each(raw, plates, metres, turn)
     used = [column for reading in done for column in reading.plate.channels]
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
     if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
-    plain, lost_plain = _decode_each(stored, placed, refused)
+    plain, lost_plain = _decode_each(stored, plates, metres, turn)
     whole = _weight_share(plain, mass)
     if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
-        return _DecodedPlates(done, lost, ())
+        return done, lost, ()
     said = (
         f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
         f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
         f"ANALOG:SCALE, or export the file again."
     )
-    return _DecodedPlates(plain, lost_plain, (said,))
+    return plain, lost_plain, (said,)
 
 
 def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
@@ -214,13 +172,13 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
 
 
 def _decode_each(
-    raw: RawC3d, placed: Sequence[tuple[PlateParameters, _Geometry]], refused: Mapping[int, str]
+    raw: RawC3d, plates: Sequence[PlateParameters], metres: float, turn: Array
 ) -> tuple[list[PlateReading], dict[int, str]]:
-    """Return the readings of the plates that make sense, and by number why others are refused, too."""
-    readings, lost = [], dict(refused)
-    for plate, place in placed:
+    """Return the readings of the plates that make sense, and by number why others are refused."""
+    readings, lost = [], {}
+    for plate in plates:
         try:
-            readings.append(_decode(raw, plate, place))
+            readings.append(_decode(raw, plate, _geometry(plate, metres, turn)))
         except TrialRefused as error:
             lost[plate.number] = str(error)
     return readings, lost

@@ -52,29 +52,14 @@ _TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
 class PlateParameters:
     """One plate as the file describes it, in file units and file axes.
 
-    Attributes
-    ----------
-    number : int
-        From 1.
-    type : int
-        TYPE of the C3D standard.
-    channels : tuple of int
-        Columns of the analog data, from 0.
-    corners, origin : Array
-        (4, 3) and (3,), in the file's length unit; the corners in file axes, ORIGIN in plate axes.
-    factors : tuple of float
-        SI unit per unit of each channel, after the calibration matrix where there is one.
-    units_said : tuple of str
-        What was decided about the units; more than one sentence where the file does not say one of them.
-    zero : tuple of int or None
-        FORCE_PLATFORM:ZERO as written, first and last sample from 1; None if it is missing or not two numbers.
-    calibration : Array or None
-        (rows, columns), output = calibration @ channels: N, and N times the file's length unit; that of session.toml
-        gives N and N·m. None where the type has none.
-    polynomial : Array or None
-        (2, 6) Kistler's correction of the centre of pressure in millimetres; None = none.
-    told : ToldPlate
-        What of it session.toml says.
+    ``number`` from 1; ``type`` of the C3D standard; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3)
+    in file axes and ``origin`` (3,) in plate axes, both in the file's length unit; ``factors`` SI unit per unit of each
+    channel, after the calibration matrix where there is one; ``units_said`` what was decided about the units, more than
+    one sentence where the file does not say one of them; ``zero`` FORCE_PLATFORM:ZERO as written, first and last sample
+    from 1, None if it is missing or not two numbers; ``calibration`` (rows, columns), output = calibration @ channels:
+    N, and N times the file's length unit (that of session.toml: N and N·m), None where the type has none;
+    ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none; ``told`` what of
+    it session.toml says.
     """
 
     number: int
@@ -121,7 +106,9 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     unused = [n for n, one in more.items() if not one.use]
     numbers = sorted({*range(1, count + 1), *(n for n, one in more.items() if one.channels)} - set(unused))
     history = tuple(f"plate{n} was left out, as session.toml says." for n in unused if n <= count)
-    if numbers and (lacks := _lack_of_samples(raw)):
+    lacks = "" if raw.analog_rate > 0 else f"has the analog rate {raw.analog_rate:g}"
+    lacks = lacks if raw.analog.shape[0] else "holds no analog samples"
+    if numbers and lacks:
         declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
         return _DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
     plates, refused = [], {}
@@ -131,13 +118,6 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
         except TrialRefused as error:
             refused[number] = str(error)
     return _DeclaredPlates(tuple(plates), refused, warnings, history)
-
-
-def _lack_of_samples(raw: RawC3d) -> str:
-    """Say why the analog data hold no samples of a plate; "" where they do."""
-    if raw.analog.shape[0] == 0:
-        return "holds no analog samples"
-    return "" if raw.analog_rate > 0 else f"has the analog rate {raw.analog_rate:g}"
 
 
 def _without_channels(told: Mapping[int, ToldPlate], count: int) -> tuple[str, ...]:

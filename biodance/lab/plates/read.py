@@ -194,10 +194,10 @@ def read_plates(
     """
     turn = np.eye(3) if turn is None else turn
     declared = declared_plates(raw, told or {}, metres=metres, turn=turn)
-    decoded = decode_plates(raw, declared.plates, metres=metres, turn=turn, mass=body_mass)
-    readings, beside = with_loads_on_plates(decoded.readings)
-    refused = {**declared.refused, **decoded.refused, **beside}
-    warnings = (*declared.warnings, *decoded.warnings, *(left_out_said(n, refused[n]) for n in sorted(refused)))
+    decoded, lost, scaled = decode_plates(raw, declared.plates, metres=metres, turn=turn, mass=body_mass)
+    readings, beside = with_loads_on_plates(decoded)
+    refused = {**declared.refused, **lost, **beside}
+    warnings = (*declared.warnings, *scaled, *(left_out_said(n, refused[n]) for n in sorted(refused)))
     if not readings:
         return PlatesRead((), warnings, declared.history)
     readings, dead = without_dead(readings, markers)

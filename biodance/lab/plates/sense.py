@@ -4,7 +4,6 @@ and with them the wrench in the lab. What the plate carries decides: weight, swa
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -271,13 +270,13 @@ def sense_plates(
         alone = bool(sign) and sum(map(abs, signs)) == 1
         odd = bool(sign) and -sign * z in votes
         try:
-            done = _in_lab(reading, sign, time, markers, alone=alone, otherwise=otherwise, odd=odd)
+            done, told, fz_alone = _in_lab(reading, sign, time, markers, alone=alone, otherwise=otherwise, odd=odd)
         except TrialRefused as error:
             warnings.append(left_out_said(reading.plate.number, error))
             continue
-        plates.append(done.plate)
-        warnings += done.warnings
-        mended = mended or done.fz_alone
+        plates.append(done)
+        warnings += told
+        mended = mended or fz_alone
     by = {sign: [str(r.plate.number) for r, v in zip(readings, votes, strict=True) if v == sign] for sign in (1, -1)}
     if by[1] and by[-1] and not mended:
         here, there = (
@@ -293,14 +292,6 @@ def sense_plates(
     return tuple(plates), tuple(warnings)
 
 
-class _Sensed(NamedTuple):
-    """A plate in the lab frame, what a person should look at, and whether its Fz alone had the wrong sign."""
-
-    plate: Plate
-    warnings: _Said
-    fz_alone: bool
-
-
 def _in_lab(
     reading: PlateReading,
     sign: int,
@@ -310,8 +301,10 @@ def _in_lab(
     alone: bool,
     otherwise: int,
     odd: bool,
-) -> _Sensed:
-    """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings."""
+) -> tuple[Plate, _Said, bool]:
+    """Return the plate with the ground's wrench ON the subject about the lab origin, what a person should look at, and
+    whether its Fz alone had the wrong sign.
+    """
     reading, moved = _with_origin_under_feet(reading, time, markers)
     wrench, said = _surface_wrench(reading)
     sway = sway_sign(wrench[:, :3], pressure_point(reading), reading.rate) if alone and sign else 0
@@ -341,7 +334,7 @@ def _in_lab(
         tuple(f"Plate {plate.number}: {one}" for one in some)
         for some in ((*steps.corners, *steps.origin, *steps.gaps), doubts)
     )
-    return _Sensed(done, (*odd_said, *reading.warnings, *more), fz_alone)
+    return done, (*odd_said, *reading.warnings, *more), fz_alone
 
 
 def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, str]:
@@ -351,13 +344,10 @@ def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, s
     if sway:
         contrary = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
         return f"{contrary}.", f"{contrary}. Check the cabling and the corner order."
-    return _upwards_said(reading.plate.type) if sign and reading.axes[2, 2] > 0 else ("", "")
-
-
-def _upwards_said(kind: int) -> tuple[str, str]:
-    """Say that a plate's z points up, and doubt it where the maker's own axes have z down (eight channels)."""
+    if not sign or reading.axes[2, 2] <= 0:
+        return "", ""
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
-    if kind not in (3, 7):
+    if reading.plate.type not in (3, 7):
         return f"{said}.", ""
     doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order."
     return doubt, doubt

@@ -7,14 +7,14 @@ where they lie elsewhere and a single plate carries everything, about its own, w
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet, landmark
-from biodance.lab.plates.corners import NOTHING_TOLD, Told, ToldPlate, plate_axes
+from biodance.lab.plates.corners import C3D_ONLY, NOTHING_TOLD, Told, around_pressures, plate_axes
 from biodance.lab.plates.decode import find_baseline
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.read import PlatesRead
@@ -27,7 +27,6 @@ _FARTHEST = 20.0
 """m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
 _SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
 _UNDER = 0.25  # m between pressure and feet up to which they belong together: a foot's length
-_MARGIN = 0.15  # m that a foot reaches beyond its markers and pressures
 _FLAT = 0.03
 """m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
 _SINKS = 0.02
@@ -104,24 +103,16 @@ def table_plates(
         history += done.history
         if done.warnings:
             return PlatesRead(tuple(placed), done.warnings, tuple(history))
-    plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
-    idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
-    warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
+    plates = []
+    for plate in sorted(placed, key=lambda one: int(one.name.removeprefix("plate"))):
+        one = told.plates.get(plate.name, NOTHING_TOLD)
+        followed = [f"{one.sentence[0].upper()}{one.sentence[1:]}"] if one.sentence else []
+        plates.append(replace(plate, foot=one.foot, decisions=(*plate.decisions, *followed)))
+    idle = {name: ", ".join(key for key in one.keys if key in C3D_ONLY) for name, one in told.plates.items()}
+    warnings = [
+        f"{name}: {keys} of session.toml can be followed in C3D files only." for name, keys in idle.items() if keys
+    ]
     return PlatesRead(tuple(plates), tuple(warnings), tuple(history))
-
-
-def _idle(told: Told) -> Mapping[str, list[str]]:
-    found = {name: [key for key in one.keys if key not in ("corners_m", "foot")] for name, one in told.plates.items()}
-    return {name: keys for name, keys in found.items() if keys}
-
-
-def _number(plate: Plate) -> int:
-    return int(plate.name.removeprefix("plate"))
-
-
-def _told(plate: Plate, said: ToldPlate) -> Plate:
-    sentences = (*plate.decisions, *([said.sentence[0].upper() + said.sentence[1:]] if said.sentence else []))
-    return replace(plate, foot=said.foot, decisions=sentences)
 
 
 def _upright(value: Array) -> tuple[Array, str]:
@@ -213,8 +204,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
             continue
         decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
         points = np.concatenate([cop, feet.middle]) if own and feet is not None else cop
-        (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
-        corners = np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
+        corners = around_pressures(points, 0.0)
         name, put = f"plate{number}", shift if own else None
         plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
     return PlatesRead(tuple(plates), history=tuple(history))

@@ -1,7 +1,6 @@
 """AMTI text: one force plate as a table of numbers, explained by a header line or a TOML file beside it."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,22 +40,8 @@ _CHANNELS = 6  # a line with all numbers of a row but one is a damaged row and n
 _EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
 
 
-@dataclass(frozen=True, eq=False)
-class _AmtiText:
-    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y), ``sensor_depth`` m."""
-
-    load: Array
-    rate: float
-    size: tuple[float, float]
-    sensor_depth: float
-    load_on_plate: bool
-    said: tuple[str, ...]
-
-
-def _parse_amti_text(path: Path) -> _AmtiText:
-    """Return the content of a text export; see `read`."""
-    text, commas = with_points(read_text(path))
-    header, values = _table(text, path)
+def _settings(header: list[str], values: Array, path: Path) -> tuple[dict[str, Any], Path | None]:
+    """Return what header and the TOML beside the text say of each of `_KEYS`, checked, and that TOML; None = none."""
     beside = path.with_suffix(".toml")
     given = _given(beside) if beside.is_file() else {}
     columns, units = _header_columns(header)
@@ -65,24 +50,14 @@ def _parse_amti_text(path: Path) -> _AmtiText:
         raise FileRefused(
             f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it."
         )
-    size, rate = given.get("plate_size_m"), given.get("rate_hz", _rate(values, columns))
-    force_unit, moment_unit = given.get("force_unit", units.get("Fz")), given.get("moment_unit", units.get("Mz"))
-    said_units = {"force_unit": force_unit, "moment_unit": moment_unit}
-    found = {"columns": columns or None, **said_units, "rate_hz": rate, "plate_size_m": size}
-    lacking = [key for key, value in found.items() if value is None]
-    if lacking:
+    usual = (None, units.get("Fz"), units.get("Mz"), _rate(values, columns), None, 0.0, "plate")
+    found = {**dict(zip(_KEYS, usual, strict=True)), **given, "columns": columns or None}
+    if lacking := [key for key, value in found.items() if value is None]:
         todo = f"Write the file {beside.name} beside it and correct what is not so:\n{_example(values, found)}"
         raise FileRefused(f"{path}: does not say {', '.join(lacking)}. {todo}")
-    _refuse_nonsense(found, given, values, beside if given else path)
-    _refuse_other_clock(values, columns, float(rate or 0), path)
-    order = [columns.index(channel) for channel in CHANNELS]
-    force, moment = plain_unit(str(force_unit)), plain_unit(str(moment_unit))
-    load, rate = values[:, order] * ([FORCE[force]] * 3 + [MOMENT[moment]] * 3), float(rate or 0)
-    told = f"Columns, units and size as in {beside.name}: " if given else "Columns and units as in the header line: "
-    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {rate:g} Hz.", *[COMMAS_READ] * commas)
-    assert size is not None
-    depth, on_plate = float(given.get("sensor_depth_m", 0.0)), given.get("acts_on", "plate") == "plate"
-    return _AmtiText(load, rate, (float(size[0]), float(size[1])), depth, on_plate, said)
+    _refuse_nonsense(found, values, beside if given else path)
+    _refuse_other_clock(values, columns, float(found["rate_hz"]), path)
+    return found, beside if given else None
 
 
 def _table(text: str, path: Path) -> tuple[list[str], Array]:
@@ -166,10 +141,10 @@ def _given(beside: Path) -> dict[str, Any]:
     return given
 
 
-def _refuse_nonsense(found: dict[str, Any], given: dict[str, Any], values: Array, where: Path) -> None:
+def _refuse_nonsense(found: dict[str, Any], values: Array, where: Path) -> None:
     """Refuse settings of the wrong kind or range, naming key, value and what is legal."""
     columns, size = found["columns"], found["plate_size_m"]
-    numbers = [found["rate_hz"], given.get("sensor_depth_m", 0.0), *(size if isinstance(size, list) else [None])]
+    numbers = [found["rate_hz"], found["sensor_depth_m"], *(size if isinstance(size, list) else [None])]
     is_number = [isinstance(n, int | float) and not isinstance(n, bool) for n in numbers]
     faults = {
         f"columns must name {values.shape[1]} columns, with each of {', '.join(CHANNELS)} once "
@@ -182,13 +157,11 @@ def _refuse_nonsense(found: dict[str, Any], given: dict[str, Any], values: Array
         f"plate_size_m must be two sides (x, y) of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g}": len(numbers) != 4
         or not all(is_number[2:])
         or not all(SHORTEST_SIDE <= side <= LONGEST_SIDE for side in numbers[2:]),
-        'acts_on must be "plate" or "subject"': given.get("acts_on", "plate") not in ("plate", "subject"),
+        'acts_on must be "plate" or "subject"': found["acts_on"] not in ("plate", "subject"),
     }
     for fault, is_so in faults.items():
         if is_so:
-            raise FileRefused(
-                f"{where}: {fault}; it is {given.get(fault.split()[0], found.get(fault.split()[0]))!r}. Correct it."
-            )
+            raise FileRefused(f"{where}: {fault}; it is {found[fault.split()[0]]!r}. Correct it.")
 
 
 def _example(values: Array, found: dict[str, Any]) -> str:
@@ -267,10 +240,17 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
         shows the TOML to write.
     """
     path = Path(path)
-    text = _parse_amti_text(path)
-    load = text.load if text.load_on_plate else -text.load
-    vector = np.array([0.0, 0.0, -text.sensor_depth])
-    plate, warnings = amti_plate(1, load, text.size, np.zeros(3), vector, rate=text.rate, said=text.said)
-    source = Source(path, sha256(read_bytes(path)), "AMTI text", analog_rate=text.rate)
-    history = (f"AMTI text export, {text.rate:g} Hz.",)
+    text, commas = with_points(read_text(path))
+    header, values = _table(text, path)
+    found, beside = _settings(header, values, path)
+    columns, rate, units = found["columns"], float(found["rate_hz"]), (found["force_unit"], found["moment_unit"])
+    force, moment = FORCE[plain_unit(str(units[0]))], MOMENT[plain_unit(str(units[1]))]
+    load = values[:, [columns.index(channel) for channel in CHANNELS]] * ([force] * 3 + [moment] * 3)
+    where = f"Columns, units and size as in {beside.name}" if beside else "Columns and units as in the header line"
+    said = (f"{where}: {', '.join(columns)}; {units[0]}, {units[1]}; {rate:g} Hz.", *[COMMAS_READ] * commas)
+    load, (x, y) = load if found["acts_on"] == "plate" else -load, found["plate_size_m"]
+    below = np.array([0.0, 0.0, -float(found["sensor_depth_m"])])
+    plate, warnings = amti_plate(1, load, (float(x), float(y)), np.zeros(3), below, rate=rate, said=said)
+    source = Source(path, sha256(read_bytes(path)), "AMTI text", analog_rate=rate)
+    history = (f"AMTI text export, {rate:g} Hz.",)
     return Trial(path.stem, role, None, (plate,), source, history=history, warnings=warnings)

@@ -65,19 +65,8 @@ class _BsfPlate:
     load: Array
 
 
-@dataclass(frozen=True, eq=False)
-class _BsfContent:
-    """What a .bsf file holds: ``version``, ``rate`` Hz, ``main`` header record, ``plates``, other channels."""
-
-    version: int
-    rate: float
-    main: Any
-    plates: tuple[_BsfPlate, ...]
-    other_channels: int
-
-
-def _parse_bsf(content: bytes, path: Path) -> _BsfContent:
-    """Return the content of a .bsf file in SI units."""
+def _parse_bsf(content: bytes, path: Path) -> tuple[Any, list[_BsfPlate], int]:
+    """Return the main header, the plates in SI units, and the number of other channels."""
     main = _main_header(content, path)
     version, rate = int(main["version"]), int(main["rate"])
     headers, end = _instruments(content, main, path)
@@ -98,7 +87,7 @@ def _parse_bsf(content: bytes, path: Path) -> _BsfContent:
         size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
         offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
         plates.append(_BsfPlate(model, int(header["serial"]), size, offset, distance, block * factor * _IMPERIAL))
-    return _BsfContent(version, float(rate), main, tuple(plates), sum(channels[int(main["plates"]) :]))
+    return main, plates, sum(channels[int(main["plates"]) :])
 
 
 def _main_header(content: bytes, path: Path) -> Any:
@@ -199,22 +188,24 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     """
     path = Path(path)
     content = read_bytes(path)
-    bsf = _parse_bsf(content, path)
-    plates, warnings, centre = [], [], np.zeros(3)
-    for number, plate in enumerate(bsf.plates, start=1):
+    main, recorded, others = _parse_bsf(content, path)
+    version, rate, plates, warnings, centre = int(main["version"]), float(main["rate"]), [], [], np.zeros(3)
+    stored = "ADC counts times the calibration in the header" if version == 100 else "engineering units"
+    for number, plate in enumerate(recorded, start=1):
         _refuse_nonsense(plate, number, path)
         if number > 1:
             centre = centre + PLATE_UPRIGHT @ plate.distance
             warnings.append(_placed(plate, number))
-        place, said = (plate.size, centre, plate.offset), (_unit_said(bsf, plate),)
-        done, odd = amti_plate(number, plate.load, *place, rate=bsf.rate, said=said)
+        name = f"{plate.model or 'Plate'}, serial {plate.serial}"
+        said = (f"{name}: {stored}; lbf and in·lbf were converted to N and N·m.",)
+        done, odd = amti_plate(number, plate.load, plate.size, centre, plate.offset, rate=rate, said=said)
         plates.append(done)
         warnings += odd
-    history = [f"AMTI NetForce file, version {bsf.version}, {bsf.rate:g} Hz."]
-    if bsf.other_channels:
-        history.append(f"{bsf.other_channels} channels of other instruments were not read.")
-    source = Source(path, sha256(content), f"AMTI .bsf {bsf.version}", analog_rate=bsf.rate)
-    told = (_measurements(bsf.main), tuple(history), tuple(warnings))
+    history = [f"AMTI NetForce file, version {version}, {rate:g} Hz."]
+    if others:
+        history.append(f"{others} channels of other instruments were not read.")
+    source = Source(path, sha256(content), f"AMTI .bsf {version}", analog_rate=rate)
+    told = (_measurements(main), tuple(history), tuple(warnings))
     return Trial(path.stem, role, None, tuple(plates), source, "", *told)
 
 
@@ -242,11 +233,6 @@ def _placed(plate: _BsfPlate, number: int) -> str:
         f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
         f"says. Check that."
     )
-
-
-def _unit_said(bsf: _BsfContent, plate: _BsfPlate) -> str:
-    stored = "ADC counts times the calibration in the header" if bsf.version == 100 else "engineering units"
-    return f"{plate.model or 'Plate'}, serial {plate.serial}: {stored}; lbf and in·lbf were converted to N and N·m."
 
 
 def _measurements(main: Any) -> dict[str, float]:

@@ -84,19 +84,11 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     rate = raw.rate if markers is not None else math.nan
     worn = known.name if known is not None and markers is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
-    history = (
-        *_read(raw),
-        *raw.history,
-        *labels.history,
-        *axes_history,
-        *_gaps(markers),
-        *measure_history,
-        *read.history,
-    )
+    history = (_contents(raw), *raw.history, *labels.history, *axes_history, _seen(markers), *measure_history)
     odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
     warnings = (*odd, *measure_warnings, *read.warnings)
     seen = (raw.path.stem, role, markers, read.plates, source, worn, measures)
-    return Trial(*seen, history, warnings, defects=read.defects)
+    return Trial(*seen, (*history, *read.history), warnings, defects=read.defects)
 
 
 read = read_c3d
@@ -137,11 +129,11 @@ def _turned(points: Array, axes: Array) -> Array:
     return turned
 
 
-def _read(raw: RawC3d) -> tuple[str, ...]:
+def _contents(raw: RawC3d) -> str:
     rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
     channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
     frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
-    return (f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}.",)
+    return f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}."
 
 
 def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:
@@ -156,14 +148,14 @@ def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None
     return Markers(labels.names, np.arange(len(points)) / (raw.rate if math.isfinite(raw.rate) else 1.0), points)
 
 
-def _gaps(markers: Markers | None) -> tuple[str, ...]:
+def _seen(markers: Markers | None) -> str:
     """Say how much of the markers was not seen, and which never were."""
     if markers is None:
-        return ("No markers.",)
+        return "No markers."
     share = 1.0 - markers.seen.mean()
     never = [name for name, seen in zip(markers.names, np.any(markers.seen, axis=0), strict=True) if not seen]
     missing = f"; never seen: {', '.join(never)}" if never else ""
-    return (f"{len(markers.names)} markers, {100 * share:.2g} % of their samples not seen{missing}.",)
+    return f"{len(markers.names)} markers, {100 * share:.2g} % of their samples not seen{missing}."
 
 
 def _turn_to_z_up(

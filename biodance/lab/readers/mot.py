@@ -11,6 +11,7 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.markers.time_axis import time_axis
 from biodance.lab.plain_text import read_bytes, sha256
+from biodance.lab.plates.corners import around_pressures
 from biodance.lab.plates.decode import find_baseline
 from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, read_mot
 from biodance.lab.readers import head_text
@@ -22,7 +23,6 @@ _NOT_PLACED = (
     "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to "
     "spare."
 )
-_FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
 _FARTHEST = 50.0  # m
 _AXES = "xyz"
 _TURNED_BY = 0.1
@@ -47,13 +47,9 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
     """Return the trial of a table with plate columns: plates, no markers."""
     table = read_mot(path)
     plates, said, doubts = plates_of(table, where=str(path))
-    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=plates_rate(plates))
+    rate = plates[0].wrench.rate if plates else math.nan
+    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=rate)
     return Trial(path.stem, role, None, plates, source, history=said, warnings=(*table.warnings, *doubts))
-
-
-def plates_rate(plates: tuple[Plate, ...]) -> float:
-    """Return the rate (Hz) of plates; NaN without one."""
-    return plates[0].wrench.rate if plates else math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,15 +103,19 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     plates = []
     for number, (name, value) in enumerate(raw.items(), start=1):
         wrench = Wrench(axis.time, sign * np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T]))
-        cop = wrench.cop(height=_height(rows[name], turn), threshold=COP_FORCE)
+        one = rows[name]
+        loaded = np.linalg.norm(one.force, axis=1) >= COP_FORCE
+        height = float(np.median((one.point[loaded] @ turn.T)[:, 2])) if loaded.any() else 0.0  # of the pressures
+        cop = wrench.cop(height=height, threshold=COP_FORCE)
         if np.isnan(cop).all():
             history.append(
                 f"Plate {number} ({name}) is never loaded above {COP_FORCE:g} N and was left out: the file does not "
                 f"say where it lies."
             )
             continue
-        said, zero = (f"Columns of {name}.", *rows[name].said, *decided, _NOT_PLACED), sign * turn @ rows[name].zero
-        plates.append(Plate(f"plate{number}", 0, _rectangle(cop), wrench, said, zero, placed=False, columns=name))
+        said, zero = (f"Columns of {name}.", *one.said, *decided, _NOT_PLACED), sign * turn @ one.zero
+        corners = around_pressures(cop, height)
+        plates.append(Plate(f"plate{number}", 0, corners, wrench, said, zero, placed=False, columns=name))
     return tuple(plates), tuple(history), warnings
 
 
@@ -228,16 +228,3 @@ def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:
     if (turn @ mean_force)[2] >= 0:
         return turn, 1.0, said
     return turn, -1.0, [*said, "The mean force points down: the file holds the load on the plate; the sign was turned."]
-
-
-def _height(rows: _Rows, turn: Array) -> float:
-    """Return the median height (m, z up) of the points of application under load; 0 if there is no load."""
-    loaded = np.linalg.norm(rows.force, axis=1) >= COP_FORCE
-    return float(np.median((rows.point[loaded] @ turn.T)[:, 2])) if loaded.any() else 0.0
-
-
-def _rectangle(cop: Array) -> Array:
-    """Return the corners (4, 3) m around the centres of pressure (T, 3), counter-clockwise seen from above."""
-    (x0, y0, z), (x1, y1, _) = np.nanmin(cop, axis=0), np.nanmax(cop, axis=0)
-    x0, y0, x1, y1 = x0 - _FOOT_MARGIN, y0 - _FOOT_MARGIN, x1 + _FOOT_MARGIN, y1 + _FOOT_MARGIN
-    return np.array([[x1, y1, z], [x0, y1, z], [x0, y0, z], [x1, y0, z]])

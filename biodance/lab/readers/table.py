@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.markers.guess import guess_set
-from biodance.lab.markers.sets import MarkerSet, read_marker_set, recognise
+from biodance.lab.markers.sets import read_marker_set, recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
 from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z, turn_to
@@ -300,7 +300,9 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     instants, arrived = camera_instants(stamps, rows.xyz)
     axis, rows = time_axis(instants, where=str(path)).from_zero(), replace(rows, time=instants)
     loads, weighed = loads_of(columns.plates, cells.labels, cells.units, cells.values)
-    known, worn = recognise(rows.names), _worn(rows)
+    known = recognise(rows.names)
+    guess = "" if known else guess_set(rows).name
+    worn = read_marker_set(guess) if guess else known
     markers, unseen = resampled(rows.names, rows.xyz, axis)
     plates = table_plates(
         [Load(one.columns, axis.at(one.value)) for one in loads], axis.time, turn, markers, worn, told or Told()
@@ -318,18 +320,14 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     )
     rate = plates.plates[0].wrench.rate if plates.plates else math.nan
     source = Source(path, sha256(content), "table", rate=markers.rate, analog_rate=rate)
-    warnings = (*_broken(columns), *([axis.said] if not axis.sampled and axis.said else []), *plates.warnings)
+    warnings = [*([axis.said] if not axis.sampled and axis.said else []), *plates.warnings]
+    if columns.broken:
+        lacking = (
+            f"Of {', '.join(columns.broken)} only two coordinates are there: they were left out. Export all three."
+        )
+        warnings.insert(0, lacking)
     name = known.name if known else ""
-    return Trial(path.stem, role, markers, plates.plates, source, name, history=history, warnings=warnings)
-
-
-def _worn(markers: Markers) -> MarkerSet | None:
-    """Return the set that was worn: the known one, else what can be guessed; None where nothing can."""
-    known = recognise(markers.names)
-    if known is not None:
-        return known
-    guess = guess_set(markers)
-    return read_marker_set(guess.name) if guess.name else None
+    return Trial(path.stem, role, markers, plates.plates, source, name, history=history, warnings=tuple(warnings))
 
 
 def _stamps(cells: Cells, columns: TableColumns, path: Path) -> tuple[Array, list[str]]:
@@ -389,12 +387,6 @@ def _columns_said(columns: TableColumns) -> list[str]:
         more = f" and {len(columns.others) - 6} more" if len(columns.others) > 6 else ""
         said.append(f"Columns that are none of these were left aside: {', '.join(columns.others[:6])}{more}.")
     return said
-
-
-def _broken(columns: TableColumns) -> tuple[str, ...]:
-    if not columns.broken:
-        return ()
-    return (f"Of {', '.join(columns.broken)} only two coordinates are there: they were left out. Export all three.",)
 
 
 def _time_said(axis: TimeAxis, markers: Markers, loads: list[Load]) -> list[str]:

@@ -1,5 +1,6 @@
 """OpenSim's table of markers, with the forces in a table of the same stem beside it."""
 
+import math
 import re
 from dataclasses import replace
 from itertools import product
@@ -23,9 +24,9 @@ from biodance.lab.plain_text import (
     with_points,
     write_whole,
 )
-from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, columns_of, read_mot
+from biodance.lab.program_tables import Y_UP_TO_Z_UP, columns_of, read_mot
 from biodance.lab.readers import head_text
-from biodance.lab.readers.mot import has_plates, plates_of, plates_rate
+from biodance.lab.readers.mot import has_plates, plates_of
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -63,7 +64,9 @@ def beside(path: Path) -> Path | None:
 
     It has the stem of the markers with a usual ending, else it is the only one whose stem goes on behind theirs.
     """
-    places = (path.parent, *_places_of_forces(path.parent))
+    folder = path.parent
+    beside_it = sorted(folder.parent.iterdir()) if _MARKER_FOLDER.search(folder.name) else []
+    places = (folder, *(one for one in beside_it if one.is_dir() and _FORCE_FOLDER.search(one.name)))
     for place in places:
         for ending, suffix in product(_FORCES_BESIDE, _TABLES):
             candidate = place / f"{path.stem}{ending}{suffix}"
@@ -93,13 +96,6 @@ def _going_on(markers: Path, place: Path) -> list[Path]:
     return [table for table in own if not any(len(s) > len(markers.stem) and fits(s, table) for s in stems)]
 
 
-def _places_of_forces(markers: Path) -> list[Path]:
-    """Return the folders for forces beside a folder for markers; none where the folder is no such one."""
-    if not _MARKER_FOLDER.search(markers.name):
-        return []
-    return [path for path in sorted(markers.parent.iterdir()) if path.is_dir() and _FORCE_FOLDER.search(path.name)]
-
-
 def _with_forces(trial: Trial, path: Path) -> Trial:
     """Return the trial with the plates of the table beside it; a damaged table is a warning, the markers stay."""
     try:
@@ -108,21 +104,17 @@ def _with_forces(trial: Trial, path: Path) -> Trial:
     except FileRefused as error:
         return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
     digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
-    source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates))
+    rate = plates[0].wrench.rate if plates else math.nan
+    source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=rate)
     history = tuple(dict.fromkeys((*trial.history, f"Forces were read from {path.name} beside it.", *said)))
-    warnings = (*trial.warnings, *table.warnings, *doubts, *_out_of_step(trial, table))
-    return replace(trial, plates=plates, source=source, history=history, warnings=warnings)
-
-
-def _out_of_step(trial: Trial, table: TimeTable) -> list[str]:
-    """Return a warning if markers and forces do not cover the same time."""
+    warnings = [*trial.warnings, *table.warnings, *doubts]
     assert trial.markers is not None  # a .trc file always holds markers
     time = trial.markers.time
     overlap = min(time[-1], table.time[-1]) - max(time[0], table.time[0])
-    if overlap >= 0.9 * (time[-1] - time[0]):
-        return []
-    span = f"{time[0]:g} to {time[-1]:g} s, the forces {table.time[0]:g} to {table.time[-1]:g} s"
-    return [f"The markers cover {span}: they may not belong together."]
+    if overlap < 0.9 * (time[-1] - time[0]):
+        span = f"{time[0]:g} to {time[-1]:g} s, the forces {table.time[0]:g} to {table.time[-1]:g} s"
+        warnings.append(f"The markers cover {span}: they may not belong together.")
+    return replace(trial, plates=plates, source=source, history=history, warnings=tuple(warnings))
 
 
 def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
@@ -157,14 +149,16 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     (time, xyz), timing = _equal_steps(tuple(names), numbers, raw_time, seen, _rate(header, path), path)
     warnings += timing
     history = [*[COMMAS_READ] * commas, *short, f"Coordinates were read in {unit} and turned into m.", *unseen]
-    if _is_z_up(Markers(tuple(names), time, xyz)):
+    # by the labels of high and low markers, else by where the cloud is tall
+    up, known = axis_to_head(Markers(tuple(names), time, xyz), recognise(names)), recognise(names)
+    if body_is_tall_along_z(xyz) if up is None or up[0] else bool(up[2]):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
         )
     else:
         xyz = xyz @ Y_UP_TO_Z_UP.T
         history.append("The file is y up (OpenSim): turned by 90 degrees about x to z up.")
-    markers, known = Markers(tuple(names), time, xyz), recognise(names)
+    markers = Markers(tuple(names), time, xyz)
     source = Source(path, sha256(content), "TRC", rate=markers.rate, first_frame=int(numbers[0]))
     worn = known.name if known else ""
     return Trial(path.stem, role, markers, (), source, worn, history=tuple(history), warnings=tuple(warnings))
@@ -327,9 +321,3 @@ def _equal_steps(
     if len(full) > raw.size:
         warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
     return (raw[0] + np.arange(len(full)) / rate, full), warnings
-
-
-def _is_z_up(markers: Markers) -> bool:
-    """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
-    axis = axis_to_head(markers, recognise(markers.names))
-    return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])

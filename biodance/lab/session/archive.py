@@ -71,7 +71,10 @@ def read_index(path: Path) -> tuple[IndexedTrial, ...]:
     for cells_of_row in filter(any, rows):
         row = dict(zip(names, (cell.strip() for cell in cells_of_row), strict=False))
         trial, person, said, mass, visit = (row.get(column[kind], "") for kind in _COLUMNS)
-        recording = _recording(path.parent, trial)
+        # with or without its extension, and never outside the folder
+        names_file = bool(trial) and Path(trial).name == trial
+        files = [path.parent / f"{trial}{ending}" for ending in ("", *extensions())] if names_file else []
+        recording = next(filter(Path.is_file, files), None)
         if recording is not None:
             visit = visit or " ".join(filter(None, (person, said[:16])))
             trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
@@ -92,13 +95,6 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return float("nan")
-
-
-def _recording(folder: Path, name: str) -> Path | None:
-    """Return the recording that a table calls ``name``, with or without its extension; None if it is not there."""
-    if not name or Path(name).name != name:
-        return None
-    return next((path for ending in ("", *extensions()) if (path := folder / f"{name}{ending}").is_file()), None)
 
 
 def _conditions(trials: list[tuple[IndexedTrial, dict[str, str]]], names: list[str]) -> list[str]:
@@ -136,7 +132,12 @@ def read_plate_text(path: Path) -> Trial:
             f"{path}: its header does not name {', '.join(lacking)}. Write a first line such as Time[s], Fx[N], Fy[N], "
             f"Fz[N], Mx[Nm], My[Nm], Mz[Nm]."
         )
-    raw = np.array([_values(line, path, number) for number, line in enumerate(lines[1:], start=2)])
+    raw = np.array(
+        [
+            [parse_number(cell, f"{path}, line {k}") for cell in _cells(line)]
+            for k, line in enumerate(lines[1:], start=2)
+        ]
+    )
     time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
     wrench = np.column_stack(value)
     sign = -1.0 if wrench[:, 2].mean() < 0 else 1.0
@@ -149,10 +150,6 @@ def read_plate_text(path: Path) -> Trial:
 
 def _cells(line: str) -> list[str]:
     return cells(line) if "," not in line and ";" not in line else [cell.strip() for cell in re.split("[,;]", line)]
-
-
-def _values(line: str, path: Path, number: int) -> list[float]:
-    return [parse_number(cell, f"{path}, line {number}") for cell in _cells(line)]
 
 
 def _factor(channel: str, unit: str, path: Path) -> float:
@@ -210,20 +207,16 @@ def _collect(folder: Path, sessions: list[Path], indices: list[Path]) -> None:
     if index is not None:
         indices.append(index)
         return
-    below = sorted(
-        path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".") and not _leads_up(path)
-    )
+    above = folder.resolve()
+    below = [path for path in sorted(folder.iterdir()) if path.is_dir() and not path.name.startswith(".")]
+    # below a link to a folder above there would be no end
+    below = [path for path in below if not (path.is_symlink() and above.is_relative_to(path.resolve()))]
     parts = [path for path in below if _PART_FOLDERS.match(path.name) and recordings_in(path)]
     if parts or recordings_in(folder):
         sessions.append(folder)
     for path in below:
         if path not in parts:
             _collect(path, sessions, indices)
-
-
-def _leads_up(folder: Path) -> bool:
-    """Return whether a folder is a link to one above it, below which there would be no end."""
-    return folder.is_symlink() and folder.parent.resolve().is_relative_to(folder.resolve())
 
 
 def visit_date(folder: Path) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from biodance.errors import SessionRefused, TrialRefused, UnknownName, did_you_mean
-from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.markers.sets import MARKED_SEGMENTS
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE, ToldPlate, corners_in_lab
 from biodance.lab.plates.decode import DEEPEST
@@ -387,47 +387,50 @@ def _origin(value: Any, where: str) -> Array | None:
     return origin
 
 
-_WRITTEN_ORDER = "# m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
-
-
 def plate_lines(session: Session) -> Iterator[str]:
-    """Yield the tables of all plates of a session, every line with a # before it."""
-    plates: dict[str, tuple[Plate, Trial]] = {}
-    for trial in session.trials:
-        for plate in trial.plates:
-            plates.setdefault(plate.name, (plate, trial))
-    hidden = None if plates else _undescribed(session)
-    if not plates and hidden is None:
+    """Yield the tables of all plates of a session, else of channels that look like some, each line with a # before."""
+    tables = _plate_tables(session)
+    if not tables:
         return
     yield "# Force plates: what stands here comes before what the files say. Take the # from the table's name and from"
     yield "# what you correct."
-    for plate, trial in plates.values():
-        yield f"# [plates.{plate.name}] # as in {trial.name}"
-        corners = [[round(float(x), 5) for x in corner] for corner in plate.corners]
-        yield f"# corners_m = {json.dumps(corners)} {_WRITTEN_ORDER}"
-        if plate.type:
-            yield f"# type = {plate.type} # of the C3D standard"
-            yield from _channel_lines(*plate_channels(plate, trial))
-        yield from _use_lines()
-    if hidden is None:
-        return
-    raw, groups = hidden
-    for number, columns in enumerate(groups, start=1):
-        yield f"# [plates.plate{number}] # its channels are in {raw.path.name}, which does not describe it"
-        yield f"# corners_m = [[x, y, z], [x, y, z], [x, y, z], [x, y, z]] {_WRITTEN_ORDER}"
-        yield f"# type = {2 if len(columns) == 6 else 3} # of the C3D standard"
-        yield from _channel_lines([raw.analog_labels[column] for column in columns], (1.0,) * len(columns))
-        yield from _use_lines()
+    for name, where, corners, kind, labels, units in tables:
+        yield f"# [plates.{name}] # {where}"
+        yield f"# corners_m = {corners} # m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
+        if kind:
+            yield f"# type = {kind} # of the C3D standard"
+        if labels:
+            yield f"# channels = {json.dumps(labels, ensure_ascii=False)} # labels, or numbers from 1"
+        if units:
+            yield f"# sensitivity = {[*units]} # N, N·m per unit of each channel as in the file; or rows of a matrix"
+        yield '# foot = "left" # or "right", where the markers do not tell which foot stands on it'
+        yield "# use = false # leaves the plate out"
+        yield ""
 
 
-def _undescribed(session: Session) -> tuple[RawC3d, tuple[tuple[int, ...], ...]] | None:
-    """Return the first file with channels that look like plates, and their columns."""
+def _plate_tables(session: Session) -> list[tuple[str, str, str, int, Sequence[str | int], tuple[float, ...]]]:
+    """Return name, where it was seen, corners, TYPE (0 = none), channels and units of every plate, or of the channels
+    in the first file whose look like plates.
+    """
+    first: dict[str, tuple[Plate, Trial]] = {}
     for trial in session.trials:
-        if trial.source.format == "C3D":
-            raw = read_raw(trial.source.path)
-            if groups := channel_groups(raw.analog_labels):
-                return raw, groups
-    return None
+        for plate in trial.plates:
+            first.setdefault(plate.name, (plate, trial))
+    tables: list[tuple[str, str, str, int, Sequence[str | int], tuple[float, ...]]] = []
+    for plate, trial in first.values():
+        corners = json.dumps([[round(float(x), 5) for x in corner] for corner in plate.corners])
+        channels = plate_channels(plate, trial) if plate.type else ([], ())
+        tables.append((plate.name, f"as in {trial.name}", corners, plate.type, *channels))
+    for trial in session.trials:
+        if tables or trial.source.format != "C3D":
+            continue
+        raw = read_raw(trial.source.path)
+        where = f"its channels are in {raw.path.name}, which does not describe it"
+        corners = f"[{', '.join(['[x, y, z]'] * 4)}]"
+        for number, columns in enumerate(channel_groups(raw.analog_labels), start=1):
+            labels, kind = [raw.analog_labels[column] for column in columns], 2 if len(columns) == 6 else 3
+            tables.append((f"plate{number}", where, corners, kind, labels, (1.0,) * len(columns)))
+    return tables
 
 
 def plate_channels(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:
@@ -443,16 +446,3 @@ def plate_channels(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[f
     told = all(label and raw.analog_labels.count(label) == 1 for label in labels)
     factors = () if found.calibration is not None else found.factors
     return [*labels] if told else [column + 1 for column in found.channels], factors
-
-
-def _channel_lines(channels: Sequence[str | int], factors: tuple[float, ...]) -> Iterator[str]:
-    if channels:
-        yield f"# channels = {json.dumps(channels, ensure_ascii=False)} # labels, or numbers from 1"
-    if factors:
-        yield f"# sensitivity = {[*factors]} # N, N·m per unit of each channel as in the file; or rows of a matrix"
-
-
-def _use_lines() -> Iterator[str]:
-    yield '# foot = "left" # or "right", where the markers do not tell which foot stands on it'
-    yield "# use = false # leaves the plate out"
-    yield ""

@@ -47,27 +47,18 @@ def visit_words(folder: Path, trials: Iterable[str]) -> Mapping[str, str]:
         said = read_session_file(folder).visit
     except BiodanceError:
         said = VisitEntry()
-    notes = _notes(folder, {name.lower() for name in trials})
+    names, eclipse = {name.lower() for name in trials}, vicon_notes([folder] if folder.is_dir() else [])[0]
+    notes = [one for one in eclipse.values() if one.trial.lower() in names]
     described = dict.fromkeys(one.description for one in notes if one.description)
-    made = sorted(filter(None, map(_made, notes)))
+    # CREATIONDATEANDTIME=2020,3,5,11,16,0
+    days = (re.match(r"(\d{4}),(\d{1,2}),(\d{1,2})\b", one.fields.get("CREATIONDATEANDTIME", "")) for one in notes)
+    made = sorted(f"{day[1]}-{day[2].zfill(2)}-{day[3].zfill(2)}" for day in days if day)
     return {
         "date": visit_date(folder) or (made[0] if made else ""),
         "lab": said.lab or "",
         "operator": said.operator or "",
         "condition": said.condition or ", ".join(described),
     }
-
-
-def _notes(folder: Path, trials: set[str]) -> list[EclipseNotes]:
-    if not folder.is_dir():
-        return []
-    return [one for one in vicon_notes([folder])[0].values() if one.trial.lower() in trials]
-
-
-def _made(notes: EclipseNotes) -> str:
-    """Return the day of ``CREATIONDATEANDTIME=2020,3,5,11,16,0``; "" for another form."""
-    found = re.match(r"(\d{4}),(\d{1,2}),(\d{1,2})\b", notes.fields.get("CREATIONDATEANDTIME", ""))
-    return "-".join([found[1], found[2].zfill(2), found[3].zfill(2)]) if found else ""
 
 
 @one_thread()
@@ -149,9 +140,8 @@ def read_session(
                 file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
             )
             labels.update(trial.markers.names if trial.markers is not None else ())
-            trial = with_parts_corrected(
-                _with_strikes(replace(trial, settings=chosen), operator), file_says.parts(file.stem)
-            )
+            trial = replace(trial, settings=chosen, warnings=(*trial.warnings, *_invalid_strikes(operator)))
+            trial = with_parts_corrected(trial, file_says.parts(file.stem))
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
@@ -204,11 +194,11 @@ def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNote
     return "fit", "a movement: its name says no other role"
 
 
-def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
-    """Return the trial with a warning for every plate that the operator marked as invalid in Eclipse."""
-    invalid = [plate for plate, state in (operator.plates if operator else {}).items() if state.lower() == "invalid"]
+def _invalid_strikes(operator: EclipseNotes | None) -> list[str]:
+    """Return a warning for every plate that the operator marked as invalid in Eclipse."""
     why = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
-    return replace(trial, warnings=(*trial.warnings, *(f"The operator marked {plate} {why}" for plate in invalid)))
+    states = operator.plates.items() if operator else ()
+    return [f"The operator marked {plate} {why}" for plate, state in states if state.lower() == "invalid"]
 
 
 def _settle_static(

@@ -16,6 +16,8 @@ from statistics import median
 from types import MappingProxyType
 from xml.etree import ElementTree
 
+import numpy as np
+
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused, SessionRefused
 from biodance.lab.markers.upright import is_still, movement
@@ -23,7 +25,7 @@ from biodance.lab.plain_text import COMMAS_READ, decode, parse_number, read_byte
 from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.records import Array, Role, Trial
+from biodance.records import Role, Trial
 from biodance.records.attention import Doubt
 
 _MILLIMETRE = 1e-3
@@ -178,13 +180,9 @@ def guess_static(trials: Sequence[Trial]) -> Trial | None:
 
     A single frame counts as still: some laboratories keep one frame of the static only.
     """
-    still = [trial for trial in trials if is_still(trial)]
-    return max(still, key=_static_quality, default=None)
-
-
-def _static_quality(trial: Trial) -> tuple[int, float]:
-    assert trial.markers is not None  # a still trial has markers
-    return int(trial.markers.seen.any(axis=0).sum()), -movement(trial.markers)
+    still = [(trial, trial.markers) for trial in trials if trial.markers is not None and is_still(trial)]
+    quality = [(int(markers.seen.any(axis=0).sum()), -movement(markers)) for _, markers in still]
+    return still[quality.index(max(quality))][0] if still else None
 
 
 TEXT = (".txt", ".csv", ".tsv")
@@ -208,7 +206,10 @@ def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[
     trials = _without_companions([*files, *more], readers)
     for file in sorted(trials, key=lambda f: (order.index(f.suffix.lower()), not _beside(f, readers), str(f))):
         trial = (file.parent, file.stem.lower())
-        twin = next((one for one in kept.values() if one.name == file.name and _same_bytes(one, file)), None)
+        # ordinary files only: a pipe is not opened, and a broken link is left to its reader
+        alike = [one for one in kept.values() if one.name == file.name and one.is_file() and file.is_file()]
+        alike = [one for one in alike if one.stat().st_size == file.stat().st_size]
+        twin = next((one for one in alike if filecmp.cmp(one, file, shallow=False)), None)
         if trial in kept:
             notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
         elif twin is not None:
@@ -243,27 +244,17 @@ def _sessions_of_their_own(parts: Mapping[Path, list[Path]], own: list[Path], *,
     """Return the parts that are sessions of their own: those that say so; the others only if there are static trials in
     more than one place, or nothing is ``beside`` them.
     """
-    whole = [part for part, found in parts.items() if _is_whole(part, found)]
+    whole = []
+    for part, found in parts.items():
+        roles = [role_by_name(file.stem) or role_by_name(file.parent.name) for file in found]
+        if _holds_any(part, _OWN_FILES) or ("static" in roles and any(role != "static" for role in roles)):
+            whole.append(part)
     places = len(whole) + any(role_by_name(file.stem) == "static" for file in own)
     return [part for part in whole if _holds_any(part, _OWN_FILES)] if places < 2 and beside else whole
 
 
 def _holds_any(folder: Path, names: Iterable[str]) -> bool:
     return any((folder / name).is_file() for name in names)
-
-
-def _is_whole(part: Path, files: list[Path]) -> bool:
-    """Return whether a folder is a session of its own: it says so, or holds a static trial and others."""
-    if _holds_any(part, _OWN_FILES):
-        return True
-    roles = [role_by_name(file.stem) or role_by_name(file.parent.name) for file in files]
-    return "static" in roles and any(role != "static" for role in roles)
-
-
-def _same_bytes(one: Path, other: Path) -> bool:
-    """Return whether two ordinary files are alike; a pipe is not opened, and a broken link is left to its reader."""
-    ordinary = one.is_file() and other.is_file()
-    return ordinary and one.stat().st_size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
@@ -386,7 +377,9 @@ def forces_apart(trials: Sequence[Trial]) -> list[str]:
     alone = [one for one in trials if one.source.format == "TRC"]
     for forces in (one for one in trials if one.source.format == "MOT" and one.plates):
         span = forces.plates[0].wrench.time[[0, -1]]
-        fits = [one for one in alone if one.markers is not None and _same_span(one.markers.time[[0, -1]], span)]
+        times = [(one, one.markers.time[[0, -1]]) for one in alone if one.markers is not None]
+        near = [one for one in times if abs(one[1][0] - span[0]) < _SAME_START]
+        fits = [one for one, time in near if abs(np.ptp(time) - np.ptp(span)) < _SAME_LENGTH * np.ptp(span) + 0.02]
         if len(fits) == 1:
             file, name = forces.source.path, f"{fits[0].source.path.stem}_grf{forces.source.path.suffix}"
             said.append(
@@ -397,11 +390,6 @@ def forces_apart(trials: Sequence[Trial]) -> list[str]:
                 )
             )
     return said
-
-
-def _same_span(one: Array, other: Array) -> bool:
-    length = other[1] - other[0]
-    return bool(abs(one[0] - other[0]) < _SAME_START and abs(one[1] - one[0] - length) < _SAME_LENGTH * length + 0.02)
 
 
 def decimal_commas(trials: Sequence[Trial]) -> list[str]:

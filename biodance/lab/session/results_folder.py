@@ -11,7 +11,7 @@ import platform
 import shutil
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -27,8 +27,8 @@ _MANIFEST = "manifest.json"  # Written last into a results folder
 
 @dataclass(frozen=True)
 class _Manifest:
-    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the
-    recordings; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
+    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the recordings;
+    SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
     """
 
     run: str
@@ -307,8 +307,9 @@ def _as_before(place: Path) -> Iterator[None]:
 
 def _taken(part: Path, place: Path) -> None:
     """Make the folder ``part`` for this process, empty; SessionRefused where another one, still alive, has it."""
-    lock, mine = part / _LOCK, f"{os.getpid()} {platform.node()}"
-    holder = _text(lock)
+    lock, mine, holder = part / _LOCK, f"{os.getpid()} {platform.node()}", ""
+    with suppress(OSError):
+        holder = lock.read_text(encoding="ascii", errors="replace")
     if holder and holder != mine and _is_alive(holder):
         raise SessionRefused(
             f"{place}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. "
@@ -324,13 +325,6 @@ def _taken(part: Path, place: Path) -> None:
             f"{place}: cannot be written to ({error.strerror or error}). Choose a place where you may write."
         ) from error
     atexit.register(shutil.rmtree, part, ignore_errors=True)
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return ""
 
 
 def _is_alive(holder: str) -> bool:

@@ -69,6 +69,7 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
         return math.nan, math.nan, ""
     sds = np.array(spread)
     weight = sds**-2 / (sds**-2).sum()
+    # the sd of the mean has the correlation of the landmarks in it, though the weights have not
     covariance = np.outer(sds, sds) * (_ALIKE + (1 - _ALIKE) * np.eye(len(sds)))
     stature = float(weight @ told)
     return stature, stature * float(np.sqrt(weight @ covariance @ weight)), ", ".join(names)
@@ -115,14 +116,11 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
 
 def _shoulder_rise(at: Mapping[str, Array]) -> tuple[float, float]:
     """Return by which share of the stature lifted arms raise the acromion markers, and its standard deviation."""
-    arms = [at[f"{side}_elbow_lateral"] - at[f"{side}_acromion"] for side in SIDES if _has_arm(at, side)]
+    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
+    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
     rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
     return rise, rise / 2
-
-
-def _has_arm(at: Mapping[str, Array], side: str) -> bool:
-    return f"{side}_elbow_lateral" in at and f"{side}_acromion" in at
 
 
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
@@ -166,7 +164,9 @@ def identify_subject(
     masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
     mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
-    sex = typed.sex or _declared_sex(sources)
+    told = next((one.value for one in _declared(sources, _SEX_NAMES, (0.0, 1.0)) if one.value in (0.0, 1.0)), None)
+    declared: Literal["F", "M"] | None = None if told is None else "M" if told else "F"  # files hold it as 0 or 1
+    sex = typed.sex or declared
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
     on_plates = [_Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
@@ -298,14 +298,6 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
         f"over the ankles of {told_by} while the person is upright in {name}: no static trial tells it."
     )
     return stature
-
-
-def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
-    """Return the sex where a file holds it as a number, 0 for a woman and 1 for a man; None otherwise."""
-    for declared in _declared(sources, _SEX_NAMES, (0.0, 1.0)):
-        if declared.value in (0.0, 1.0):
-            return "M" if declared.value else "F"
-    return None
 
 
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:

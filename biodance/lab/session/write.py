@@ -25,7 +25,7 @@ from biodance.lab.session.entries import plate_lines
 from biodance.lab.session.file import FILES
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import whole_folder
-from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
+from biodance.records import Markers, Plate, Session, Trial, Wrench
 
 _FILE = "session.toml"
 
@@ -62,7 +62,11 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
     """
     target = Path(folder) / _FILE
-    _refuse_existing(target)
+    if target.exists():
+        raise SessionRefused(
+            f"{target} is there already, and nothing of yours is overwritten. Correct it, or move it away and run this "
+            f"again."
+        )
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
     lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
@@ -70,26 +74,23 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     return found
 
 
-def _refuse_existing(target: Path) -> None:
-    if target.exists():
-        raise SessionRefused(
-            f"{target} is there already, and nothing of yours is overwritten. Correct it, or move it away and run this "
-            f"again."
-        )
-
-
 def _found(session: Session, target: Path) -> dict[str, Any]:
     """Return what the file will say, as plain values."""
     worn = next((trial.marker_set for trial in _statics_first(session) if trial.marker_set), "")
     trials, plates = [], []
     for trial in session.trials:
-        trials.append({"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)})
+        start = f"{trial.name} has the role {trial.role}: "
+        why = next((note.removeprefix(start).rstrip(".") for note in session.notes if note.startswith(start)), "")
+        trials.append({"name": trial.source.path.stem, "role": trial.role, "why": why})
         for plate in trial.plates:
             said = {"name": plate.name, "type": plate.type, "decisions": list(plate.decisions)}
             plates.append({"trial": trial.name, **said})
+    who = session.subject
+    numbers = {"mass_kg": who.mass, "height_m": who.stature, "age": who.age}
+    known = {key: float(f"{value:.4g}") if math.isfinite(value) else None for key, value in numbers.items()}
     return {
         "file": str(target),
-        "subject": _subject(session.subject),
+        "subject": {"name": who.name, **known, "sex": who.sex, "guessed": list(who.guessed)},
         "trials": trials,
         "markers": any(trial.markers is not None for trial in session.trials),
         "marker_set": worn.partition(" {")[0] or None,
@@ -102,17 +103,6 @@ def _found(session: Session, target: Path) -> dict[str, Any]:
 
 def _statics_first(session: Session) -> list[Trial]:
     return sorted(session.trials, key=lambda trial: trial.role != "static")
-
-
-def _subject(subject: Subject) -> dict[str, Any]:
-    numbers = {"mass_kg": subject.mass, "height_m": subject.stature, "age": subject.age}
-    known = {key: float(f"{value:.4g}") if math.isfinite(value) else None for key, value in numbers.items()}
-    return {"name": subject.name, **known, "sex": subject.sex, "guessed": list(subject.guessed)}
-
-
-def _why(session: Session, trial: Trial) -> str:
-    start = f"{trial.name} has the role {trial.role}: "
-    return next((note.removeprefix(start).rstrip(".") for note in session.notes if note.startswith(start)), "")
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:
@@ -247,15 +237,10 @@ def _write_registered(
     for name in FILES:
         if (own.resolve().parent / name).is_file() and not (folder / name).exists():
             shutil.copyfile(own.resolve().parent / name, folder / name)
-    for name in FILES:
-        if (folder / name).is_file():
-            _take_plates_out(folder / name)
-
-
-def _take_plates_out(path: Path) -> None:
-    """Take the tables ``[plates.NAME]`` out of a copied file: they are about plates as they were before."""
-    text = path.read_text(encoding="utf-8")
-    path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
+    # the tables [plates.NAME] of a copied file are about plates as they were before
+    for path in (folder / name for name in FILES if (folder / name).is_file()):
+        text = path.read_text(encoding="utf-8")
+        path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
 
 
 def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[PlateRecording], float]:

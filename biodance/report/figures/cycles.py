@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from biodance.cycles.beside import EMG
-from biodance.cycles.curves import CurveGroup, NormalCurve
+from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
+from biodance.cycles.scores import NormalCurve
 from biodance.cycles.summary import Repetitions
 from biodance.display import GREY, spaced
 from biodance.records import SIDES, Array

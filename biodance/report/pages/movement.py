@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from biodance.cycles.beside import EMG
-from biodance.cycles.curves import NormalCurve
 from biodance.cycles.keys import ANGLE_PANELS, GROUND_PEAKS, LOAD_PANELS
-from biodance.cycles.scores import SCORE_ANGLES, GaitScores
+from biodance.cycles.scores import SCORE_ANGLES, GaitScores, NormalCurve
 from biodance.cycles.summary import KeySummary, LeftOutBecause, Repetitions, Spread
 from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
