@@ -101,7 +101,9 @@ class ImpreciseCopy:
         centre = pose.position + np.einsum("tnij,nj->tni", pose.rotation, sip.com)
         pull, change = np.broadcast_to(-np.array(GRAVITY), centre.shape), np.zeros_like(centre)
         if not self.still:
-            pull, change = pull + _second(centre, self._step), self._spin_change(pose)
+            out = np.zeros_like(centre)
+            out[1:-1] = (centre[2:] - 2 * centre[1:-1] + centre[:-2]) / self._step**2
+            pull, change = pull + out, self._spin_change(pose)
         moment = (np.cross(centre, sip.mass[:, None] * pull) + change).sum(axis=1)
         force = (sip.mass[:, None] * pull).sum(axis=1)
         return np.asarray(np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:])
@@ -137,12 +139,6 @@ class ForImprecise:
     least: float
     key: str
     words: str
-
-
-def _second(values: Array, step: float) -> Array:
-    out = np.zeros_like(values)
-    out[1:-1] = (values[2:] - 2 * values[1:-1] + values[:-2]) / step**2
-    return out
 
 
 def _vector(turn: Array) -> Array:

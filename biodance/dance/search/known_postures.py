@@ -409,19 +409,15 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
     if stance.seat:
         x[:, 2] = stance.seat
         return x
-    x[:, :2] = middle = _middle(stance)
+    # The point (2,) m over which people stand: behind the middle of the support, or of the foot that bears.
+    along = stance if stance.over is None else stance.on(stance.over)
+    x[:, :2] = middle = np.array([along.centre[0] - _BACK, stance.centre[1]])
     for _ in range(_ROUNDS):
         x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
         x = chain.plant(x, stance.planted, stance.ankle)
         x[:, :2] += middle - chain.mass_centre(x)[:, :2]
     x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
     return chain.plant(x, stance.planted, stance.ankle)
-
-
-def _middle(stance: Stance) -> Array:
-    """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
-    along = stance if stance.over is None else stance.on(stance.over)
-    return np.array([along.centre[0] - _BACK, stance.centre[1]])
 
 
 def nearest_in_words(table: PostureTable, limits: tuple[Limit, ...]) -> str:
