@@ -14,10 +14,8 @@ from biodance.library import folder, names, read_toml
 from biodance.records import SIDES
 
 _TEMPLATES = "protocols/limits"
-_NOBODY = "nobody"
-"""Where the form begins with nothing filled in."""
-_FILE = Path("the form")
-"""By what messages call what was filled in."""
+_NOBODY = "nobody"  # Where the form begins with nothing filled in
+_FILE = Path("the form")  # By what messages call what was filled in
 _CANNOT = {
     "stand": "Stand",
     "stand on right leg": "Stand on the right leg alone",

@@ -22,10 +22,8 @@ from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
 from biodance.report.files import for_spreadsheets
 
-_LONGEST = 600.0
-"""s that a program started for one download may take."""
-_MOST_ROWS = 20_000
-"""Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)."""
+_LONGEST = 600.0  # s that a program started for one download may take
+_MOST_ROWS = 20_000  # Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)
 _PARTS: Mapping[str, tuple[str, ...]] = {
     "gait": ("movement", "gait"),
     "body": ("body", "replay", "masses", "predicts", "torques", "impact", "load", "danced", "changes", "standing"),

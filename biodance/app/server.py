@@ -111,8 +111,7 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-_PATIENCE = 10.0
-"""s that a request's body may take."""
+_PATIENCE = 10.0  # s that a request's body may take
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
@@ -160,9 +159,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
 
 
 def _answered(work: Callable[[Asked], Any]) -> Callable[[Request], Any]:
-    """Return an endpoint that does a ``work`` in a thread and answers with what it returns; with a sentence where that
-    is not possible.
-    """
+    """Return an endpoint that does a ``work`` in a thread and answers what it returns, or with a sentence why not."""
 
     async def endpoint(request: Request) -> Response:
         try:

@@ -24,12 +24,9 @@ from biodance.records import ROLES, Array, FootEvent, Markers, Plate, Session, T
 from biodance.report.pages.template import packed_numbers
 from biodance.report.tables.schema import plain_values
 
-_FRAMES = 1500
-"""Frames of a trial that are drawn at most."""
-_POINTS = 600
-"""Points of a curve that are drawn at most."""
-_LOADED = 20.0
-"""N from which a plate has a centre of pressure."""
+_FRAMES = 1500  # Frames of a trial that are drawn at most
+_POINTS = 600  # Points of a curve that are drawn at most
+_LOADED = 20.0  # N from which a plate has a centre of pressure
 
 
 def markers_document(trial: Trial) -> dict[str, Any]:

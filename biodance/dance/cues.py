@@ -17,26 +17,18 @@ from biodance.dance.problem.stance import Stance
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
-_SMALLEST = 12.0
-"""degrees: a smaller change is not called."""
-_HANGING = float(np.radians(80.0))
-"""rad that knees are bent of somebody who has sat down."""
-_STEP = 15.0
-"""degrees to which angles are rounded."""
-_MOST = 4
-"""Things that a person can begin at once."""
-_ALIKE = 12.0
-"""degrees within which right and left are called as a pair."""
-_FORWARD = np.array([1.0, 1.0, -1.0])
-"""Signs of turn, drop and tilt as they are called."""
-_BENT = 30.0
-"""degrees by which the hips lean of themselves when knees that stand bend."""
+_SMALLEST = 12.0  # degrees: a smaller change is not called
+_HANGING = float(np.radians(80.0))  # rad that knees are bent of somebody who has sat down
+_STEP = 15.0  # degrees to which angles are rounded
+_MOST = 4  # Things that a person can begin at once
+_ALIKE = 12.0  # degrees within which right and left are called as a pair
+_FORWARD = np.array([1.0, 1.0, -1.0])  # Signs of turn, drop and tilt as they are called
+_BENT = 30.0  # degrees by which the hips lean of themselves when knees that stand bend
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
 """Beginnings of the names of the joints of the right and of the left arm."""
-_LIFTED = ("shoulder_flexion", "shoulder_adduction")
-"""Movements whose right angle is shoulder height."""
+_LIFTED = ("shoulder_flexion", "shoulder_adduction")  # Movements whose right angle is shoulder height
 REST = "Then rest: let the arms down. Take up this posture again when you are ready."
 """What is called where the person rests (`rests`)."""
 PLURAL = {"foot": "feet"}

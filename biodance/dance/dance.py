@@ -34,11 +34,9 @@ LARGEST = 2**26
 """Bytes of a dance.npz, unpacked: a thousand times a dance of forty postures."""
 MOST_POSTURES, LONGEST = 1000, 3600.0
 """Postures of a dance, and s that it lasts: what nobody performs."""
-_FAR = 10.0
-"""m: nothing of a dance is farther from the lab origin."""
+_FAR = 10.0  # m: nothing of a dance is farther from the lab origin
 Metres = Annotated[float, Field(ge=-_FAR, le=_FAR, allow_inf_nan=False)]
-_Grip = Annotated[float, Field(allow_inf_nan=True)]
-"""m, NaN = a free hand."""
+_Grip = Annotated[float, Field(allow_inf_nan=True)]  # m, NaN = a free hand
 _Foot = Annotated[int, Field(ge=0, le=1)]
 
 

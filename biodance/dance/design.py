@@ -25,18 +25,13 @@ from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
-_ROUNDS = 6
-"""Times that all performers dance the whole dance at most."""
-_OTHERS = 6
-"""Postures that are tried in the place of one."""
-_FEW = 40
-"""Performers of a first look."""
+_ROUNDS = 6  # Times that all performers dance the whole dance at most
+_OTHERS = 6  # Postures that are tried in the place of one
+_FEW = 40  # Performers of a first look
 
-_MUCH = 1 / 3
-"""Share of the plan's postures with which nothing longer is looked for."""
+_MUCH = 1 / 3  # Share of the plan's postures with which nothing longer is looked for
 
-_Other = tuple[Course[WordStep], tuple[int, ...]]
-"""A course, and the postures where it differs."""
+_Other = tuple[Course[WordStep], tuple[int, ...]]  # A course, and the postures where it differs
 
 
 def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:

@@ -24,22 +24,16 @@ from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
 
-_RATE, _PLAN_RATE = 5.0, 25.0
-"""Hz at which performances are judged, and the plan is laid out."""
-_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5
-"""Hz: how fast errors, tempo and sway change."""
+_RATE, _PLAN_RATE = 5.0, 25.0  # Hz at which performances are judged, and the plan is laid out
+_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5  # Hz: how fast errors, tempo and sway change
 _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
-_PENDULUM = 0.1
-"""s²: height of the centre of mass over gravity."""
-_LIFT = 1.0
-"""Share of a move in which a foot leaves the ground, or comes back."""
+_PENDULUM = 0.1  # s²: height of the centre of mass over gravity
+_LIFT = 1.0  # Share of a move in which a foot leaves the ground, or comes back
 _FELT = 3.0
 """s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
-_ROUNDS = 2
-"""Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
-_CARRIED = 0.85
-"""m that the centre of mass goes when the pelvis goes 1 m over planted feet."""
+_ROUNDS = 2  # Corrections of the pelvis; what is left is a tenth of a millimetre a degree
+_CARRIED = 0.85  # m that the centre of mass goes when the pelvis goes 1 m over planted feet
 
 
 @dataclass(frozen=True)
@@ -226,12 +220,9 @@ OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
-_DRAWN = 96
-"""Imprecise copies of an instant that are looked at."""
-_TOGETHER = 1000
-"""Frames of performers that are looked at together."""
-_STILL = 1e-4
-"""Least deviation, in the limit's unit."""
+_DRAWN = 96  # Imprecise copies of an instant that are looked at
+_TOGETHER = 1000  # Frames of performers that are looked at together
+_STILL = 1e-4  # Least deviation, in the limit's unit
 
 
 @dataclass(frozen=True)

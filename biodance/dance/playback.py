@@ -224,8 +224,7 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
     return total
 
 
-_RATE = 100.0
-"""Hz at which plan and playback are compared."""
+_RATE = 100.0  # Hz at which plan and playback are compared
 UNSURE = 0.2
 """s around the instant at which a foot leaves the ground, or comes back, in which it may still, or already, bear: it
 rises by 10 h (t/T)³ at first, so that what sinks by 1 mm bears 0.2 s longer where h = 0.1 m in T = 2 s."""

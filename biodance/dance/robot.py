@@ -35,8 +35,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array
 from biodance.uncertainty.noise import Noise
 
-_WHERE = 4
-"""Beside the seed: what is searched for at random here."""
+_WHERE = 4  # Beside the seed: what is searched for at random here
 
 
 def rest_posture(dance: Dance, plan: Plan) -> Array:
@@ -190,10 +189,8 @@ def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
 
 ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
 """N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
-_RATE = 4.0
-"""Hz: independent samples of the wrench."""
-_STEPS = 10
-"""Durations of a dance after which what is expected is told."""
+_RATE = 4.0  # Hz: independent samples of the wrench
+_STEPS = 10  # Durations of a dance after which what is expected is told
 
 
 def expect_robot(dance: Dance) -> Expectation:

@@ -25,8 +25,7 @@ from biodance.report.figures.dance import criterion_figure, expectation_figure, 
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.files import write_files
-from biodance.report.pages.dance_words import posture_said
-from biodance.report.pages.language import ENGLISH, N_, read_language
+from biodance.report.pages.language import ENGLISH, N_, posture_said, read_language
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema, markdown_table, plain_values, shown, to_text
 from biodance.report.terminal import print_line, print_table

@@ -91,10 +91,8 @@ def print_live(found: LiveResult, document: Row, console: Console) -> None:
 
 _LOOPBACK = "127.0.0.1"
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'"
-_PATIENCE = 10.0
-"""s for which a connection may say nothing."""
-_LAST = 2.0
-"""s that the end waits for the page to fetch it."""
+_PATIENCE = 10.0  # s for which a connection may say nothing
+_LAST = 2.0  # s that the end waits for the page to fetch it
 
 
 class _Server(ThreadingHTTPServer):

@@ -256,9 +256,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
 
 
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (which exists) and return the
-    numbers.
-    """
+    """Write ``report.html``, ``results.json``, ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
     document = plates_document(found)
     texts = {
         "results.json": to_text(document),

@@ -170,9 +170,7 @@ def _print_performance(found: Row, console: Console) -> None:
 
 
 def print_foresight(found: Row, console: Console) -> None:
-    """Print what a movement will see, what it will confuse, what it cannot see and what to change first, of `biodance
-    foresee`.
-    """
+    """Print of `biodance foresee` what a movement will see, confuse and not see, and what to change first."""
     for sentence in filter(None, (found["summary"], found["learned"], found["plates"], found["care"])):
         print_line(console, sentence)
     print_line(console, f"will see: {causes_by_effect(seen_causes(found)) or 'nothing of what it looks for'}")
@@ -204,9 +202,7 @@ def _print_accepted(found: Row, console: Console) -> None:
 
 
 def print_diagnosis(found: Row, console: Console) -> None:
-    """Print of `biodance diagnose`: the headline, what was found with size and interval, what was judged, what is
-    left.
-    """
+    """Print of `biodance diagnose`: headline, what was found with size and interval, what was judged, what is left."""
     print_attention(found["attention"], console)
     for what, cause in found["failures"].items():
         print_line(console, "look: ", bold=f"not solved, {what}", then=f": {cause}")

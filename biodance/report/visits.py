@@ -136,8 +136,7 @@ def visit_place(one: Row) -> str:
 
 COMPARE_PAGE = "compare.html"
 _COLOURS = {"right": BLUE, "left": RED, "middle": BLUE}
-_DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")
-"""Of all visits but the last, in turn."""
+_DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")  # Of all visits but the last, in turn
 
 
 def _looks(count: int, side: str) -> list[Stroke]:

@@ -92,9 +92,7 @@ def _rope(performance: Performance, point: Array) -> tuple[Array, Array]:
 
 @acting
 def body_weight_support(performance: Performance, time: Array, target: str, force: float, stiffness: float) -> Array:
-    """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as
-    the person goes down.
-    """
+    """Hang a rope from the ceiling to the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as it goes down."""
     if performance.plan.role == "static":
         return np.zeros((time.size, 6))
     point = grip("pelvis", true_poses(performance, time))
@@ -140,8 +138,7 @@ class Spring:
     free: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-_FLESH = {"trunk_head": Spring(5.5, 0.3)}
-"""Viscera; other flesh hangs on `MUSCLE`."""
+_FLESH = {"trunk_head": Spring(5.5, 0.3)}  # Viscera; other flesh hangs on `MUSCLE`
 MUSCLE = Spring(9.0, 0.3)
 LIQUID = Spring(1.3, 0.08, (1.0, 1.0, 0.0))
 

@@ -40,10 +40,8 @@ TISSUES = {"pulled": (1.0, 1.0, 0.0), "swinging": (0.4, 3.0, 0.0), "wavy": (0.3,
 """Kinds of soft tissue: how many times as large as usual its pull by the joints, its swing under acceleration, and
 waves at frequencies of their own (Cheze 1995, doi:10.1016/0021-9290(94)00072-D) are.
 """
-_WAVES = (1.0, 8.0)
-"""rad/s between which the frequencies of waves lie: those of whole-body movement."""
-_BENT = 0.5
-"""rad: a wave is as large as what a joint pulls that is bent so far."""
+_WAVES = (1.0, 8.0)  # rad/s between which the frequencies of waves lie: those of whole-body movement
+_BENT = 0.5  # rad: a wave is as large as what a joint pulls that is bent so far
 
 
 @dataclass(frozen=True, eq=False)

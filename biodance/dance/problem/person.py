@@ -13,9 +13,8 @@ from biodance.body.body import Body
 from biodance.body.parts import JointLimits
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
-from biodance.dance.problem.plan import LEAST_REST, Plan
+from biodance.dance.problem.plan import LEAST_REST, Plan, finite_number, sentences, table
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
-from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES
@@ -33,10 +32,8 @@ _RESTING = {
     "hip_rotation": (math.radians(5.0), "Whoever stands or sits upright turns the hips a little"),
 }
 """rad to both sides of straight that nobody can do without, and why."""
-_FITS = math.radians(3.0)
-"""rad less at which the seat is soft enough."""
-_LEAST_RANGE = math.radians(6.0)
-"""rad: nobody holds a joint within less."""
+_FITS = math.radians(3.0)  # rad less at which the seat is soft enough
+_LEAST_RANGE = math.radians(6.0)  # rad: nobody holds a joint within less
 _LIMBS = {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee", "ankle")}
 """What an arm and a leg are made of."""
 
@@ -262,8 +259,7 @@ GRADES = {"grade 5": 1.0, "grade 4": 0.6, "grade 3": 0.25}
 gravity.
 """
 _RIGHT_ANGLE = math.pi / 2
-_SEAT = (0.3, 1.2)
-"""m that a seat may be high."""
+_SEAT = (0.3, 1.2)  # m that a seat may be high
 _Ranges = list[tuple[str, float, float]]
 
 PLAIN_MOVEMENTS = {

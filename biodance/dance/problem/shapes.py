@@ -103,10 +103,8 @@ def palm(body: Body, side: str) -> tuple[int, Array]:
 
 _NEAR = 2
 """Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
-_POINTS = 41
-"""On a limb's axis, at which it is held against others at zero angles."""
-_LEAST = 0.01
-"""Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
+_POINTS = 41  # On a limb's axis, at which it is held against others at zero angles
+_LEAST = 0.01  # Half length of a capsule in a cube, in its radius: a line of no length has no direction
 
 
 def capsule(body: Body, segment: int) -> tuple[Array, float]:

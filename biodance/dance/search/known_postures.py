@@ -45,10 +45,8 @@ _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
 """Joints by what moves."""
 _FITS = np.radians(25.0)
 """rad: a word that a person's range shortens by more is not asked of that person."""
-_CUT = np.radians(10.0)
-"""rad by which a word may be cut short without saying so."""
-_STOP = np.radians(1.5)
-"""rad that a word keeps from a joint's stop."""
+_CUT = np.radians(10.0)  # rad by which a word may be cut short without saying so
+_STOP = np.radians(1.5)  # rad that a word keeps from a joint's stop
 
 
 @dataclass(frozen=True)
@@ -283,16 +281,13 @@ def singular(text: str) -> str:
     return text
 
 
-_ROUNDS = 5
-"""Corrections of the pelvis; each leaves about a fifth of the error."""
-_BACK = 0.03
-"""m behind the middle of the support where people stand: over the arch of the foot."""
+_ROUNDS = 5  # Corrections of the pelvis; each leaves about a fifth of the error
+_BACK = 0.03  # m behind the middle of the support where people stand: over the arch of the foot
 _GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
 """Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
 _ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
 """rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
-_FROM_STOP = float(np.radians(3.0))
-"""rad that the joints of a holding arm keep from their stops."""
+_FROM_STOP = float(np.radians(3.0))  # rad that the joints of a holding arm keep from their stops
 _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
 

@@ -44,8 +44,7 @@ of the rounds.
 """
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
-_LITTLE = 0.01
-"""s·(rad/s²)², information on every inertia that is supposed before the first move."""
+_LITTLE = 0.01  # s·(rad/s²)², information on every inertia that is supposed before the first move
 HOPELESS = 0.5
 """Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
 without the reserve on the coarse grid.
@@ -280,19 +279,16 @@ def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move |
     return Move(via, duration, first.gram + second.gram, 0.0, "", stop[None])
 
 
-_SLOWER = (1.0, 1.4, 1.8)
-"""Factors on the duration of a straight move, one after the other."""
+_SLOWER = (1.0, 1.4, 1.8)  # Factors on the duration of a straight move, one after the other
 ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _ITERATIONS = (12, 8)
-_FROM_STOP = 0.08
-"""rad that a lifted leg keeps from the stops of its joints."""
+_FROM_STOP = 0.08  # rad that a lifted leg keeps from the stops of its joints
 _LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
 """rad by which hip, knee and ankle of a lifted leg bend on the way, and by which it goes away from the other one."""
 _SAMPLED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Fractions of a move at which imprecise people must have room, too."""
-_STANDING = 0.2
-"""s of standing still before and after a move that is looked at alone."""
+_STANDING = 0.2  # s of standing still before and after a move that is looked at alone
 
 
 def straight_move(task: Task, stances: tuple[Stance, Stance], enough: float = ENOUGH) -> tuple[Move, float]:

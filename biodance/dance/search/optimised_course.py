@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import static_grams
+from biodance.dance.problem.excitation import PostureInformation, static_grams, update_posterior
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.search.course import Course, DesignContext, PlainStep, with_exciting_moves
-from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.postures import (
     KEPT,
     Exciting,
@@ -32,8 +31,7 @@ from biodance.dance.search.postures import (
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_METRE = 3.0
-"""rad that a metre of the root counts."""
+_METRE = 3.0  # rad that a metre of the root counts
 _ENDS = (1, 0, 1)
 """Which end of a move that cannot be made is exchanged: where it goes to, comes from, the new one where it goes to."""
 _REST = (0.0, 0.6, 0.15)

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.dance import Dance
+from biodance.dance.problem.excitation import PostureInformation, update_posterior
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via
 from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
 from biodance.dance.search.course import Course, DesignContext, move_task
-from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.known_postures import (
     PostureTable,
     Word,
@@ -39,8 +39,7 @@ from biodance.dance.search.move import AMPLE, ENOUGH, Move, Task, straight_move
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_PARTS = 2
-"""Parts of the body that change at a time."""
+_PARTS = 2  # Parts of the body that change at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,8 +190,7 @@ def feet_key(stance: Stance) -> str:
 
 LEAST = 2
 """Postures of a dance: between them there is one move."""
-_Blocks = tuple[tuple[str, int], ...]
-"""Feet, and how many postures on them (`Plan.blocks`)."""
+_Blocks = tuple[tuple[str, int], ...]  # Feet, and how many postures on them (`Plan.blocks`)
 
 
 class NoNextPosture(BiodanceError):
@@ -216,9 +214,7 @@ class NoNextPosture(BiodanceError):
             self.reached = 0  # its feet cannot be left, or not be reached
 
     def possible(self, blocks: _Blocks) -> _Blocks:
-        """Return the blocks of a plan without those postures that are not possible; empty where these are no part of
-        it.
-        """
+        """Return the blocks of a plan without postures that are not possible; empty where these are no part of it."""
         shorter = [(name, self.reached if name == self.stance else count) for name, count in blocks]
         return tuple((name, count) for name, count in shorter if count) if tuple(shorter) != blocks else ()
 
@@ -229,18 +225,13 @@ class NoNextPosture(BiodanceError):
         return f"Left out: {out} {self.stance.replace('_', ' ')}; {self.why}."
 
 
-_INSTRUCTION = 0.5
-"""s that one instruction is worth at simplicity 1."""
-_TRIES = 200
-"""Postures that are taken or given up before a search is."""
-_NEXT_TRIED = 5
-"""Postures that are tried after another one before that one is given up."""
+_INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
+_TRIES = 200  # Postures that are taken or given up before a search is
+_NEXT_TRIED = 5  # Postures that are tried after another one before that one is given up
 _AT_ONCE = 12
 """Postures of which one that imprecise people surely can is taken before others that tell more."""
-_LIFTING = 1.4
-"""Times as long as others that a move takes in which a foot is lifted or put down."""
-_LOOKED_AT = 24
-"""Postures that tell most standing still, whose moves are judged, too."""
+_LIFTING = 1.4  # Times as long as others that a move takes in which a foot is lifted or put down
+_LOOKED_AT = 24  # Postures that tell most standing still, whose moves are judged, too
 
 
 @dataclass(eq=False)

@@ -35,9 +35,7 @@ def mass_figure(found: Identification, paper: Identification | None = None, load
 
 
 def shape_figure(found: Identification, paper: Identification | None = None) -> str:
-    """Return centre of mass (segment axes, from the proximal joint) and inertia about it of every segment, as
-    `mass_figure` draws masses.
-    """
+    """Return centre of mass (segment axes, from the proximal joint) and inertia about it, drawn as by `mass_figure`."""
     drawn = [
         _forest(_quantity(found, name, times), _beside(paper, name, times), title) for name, times, title in _SHAPE
     ]

@@ -81,9 +81,7 @@ def criterion_figure(values: Array, bound: float) -> "Figure":
 
 
 def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
-    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance;
-    a column a stance.
-    """
+    """Draw the zero-moment point of every move: below on the straight way, above in the dance; a column a stance."""
     names = list(dict.fromkeys(path.stance.name for path in paths))
     with look():
         drawn = figure(4.0)
@@ -115,9 +113,7 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
 
 
 def expectation_figure(expectation: "Expectation") -> "Figure":
-    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of
-    the table's.
-    """
+    """Draw the expected standard deviations of mass and centre of mass by duration, as shares of the table's."""
     kinds = [name.removeprefix("right_") for name in expectation.segments if not name.startswith("left_")]
     colours = (BLACK, ORANGE, SKY, GREEN, BLUE, RED, PINK, GREY)
     with look():
@@ -149,21 +145,15 @@ def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) 
     axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linestyle=style, linewidth=0.9, label=label)
 
 
-_RATE = 25.0
-"""Pictures per second."""
-_SIZE, _FLOOR = (290, 480), 450
-"""Of one view, px; row of the floor."""
-_SCALE = 170.0
-"""px per metre of a person's height."""
-_TALL = 1.75
-"""m: bodies are drawn as large as if they were so tall."""
+_RATE = 25.0  # Pictures per second
+_SIZE, _FLOOR = (290, 480), 450  # Of one view, px; row of the floor
+_SCALE = 170.0  # px per metre of a person's height
+_TALL = 1.75  # m: bodies are drawn as large as if they were so tall
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Title and horizontal direction of the eye."""
-_FINE = 2
-"""Times as fine a picture is drawn before it is made smaller, so that edges are smooth."""
+_FINE = 2  # Times as fine a picture is drawn before it is made smaller, so that edges are smooth
 _INK = {"right": (0, 114, 178), "left": (213, 94, 0), "middle": (110, 120, 130)}
-_PALE = 0.55
-"""Share of white in the colours of the plan."""
+_PALE = 0.55  # Share of white in the colours of the plan
 _FORMATS = (".gif", ".mp4")
 
 

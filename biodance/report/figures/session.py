@@ -58,8 +58,7 @@ def marker_figure(fit: MarkerFit) -> str:
     return bar_list(rows, "Distance of every marker to the model, RMS, the worst first")
 
 
-_AROUND = 200.0
-"""mm that the wide view shows around the feet."""
+_AROUND = 200.0  # mm that the wide view shows around the feet
 _SQUARE = Frame(width=390.0, height=240.0, left=48.0)
 
 
@@ -130,9 +129,7 @@ def standing_figure(standing: QuietStanding) -> str:
 
 
 def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: NDArray[np.bool_]) -> list[list[Strip]]:
-    """Return for each channel its curves (measured first) over the differences measured minus curve; forces left,
-    moments right.
-    """
+    """Return for each channel its curves, measured first, over measured minus curve; forces left, moments right."""
     cells = []
     for channel in (0, 3, 1, 4, 2, 5):
         title, least = CHANNEL_TITLES[channel], _LEAST[channel]

@@ -21,8 +21,7 @@ STEPS = 4000
 """Steps along each axis of a plot: a value is read to 1/4000 of what the axis spans."""
 _PLACES = 360
 """Places along a curve that are told apart: of longer ones each place shows the lowest and the highest value."""
-_FAR = 8 * STEPS
-"""Steps beyond which a value outside the axes is cut."""
+_FAR = 8 * STEPS  # Steps beyond which a value outside the axes is cut
 
 
 @dataclass(frozen=True)
@@ -228,12 +227,9 @@ def panel(x: Axis, y: Axis, marks: Iterable[str], about: str, *, frame: Frame = 
     )
 
 
-_MUCH = 0.7
-"""Share of used frames below which a figure begins with these."""
-_NARROW, _TALL = 46.0, 110.0
-"""px of the height of a difference and of a curve."""
-_THREE = 300.0
-"""px of width below which three panels stand beside each other."""
+_MUCH = 0.7  # Share of used frames below which a figure begins with these
+_NARROW, _TALL = 46.0, 110.0  # px of the height of a difference and of a curve
+_THREE = 300.0  # px of width below which three panels stand beside each other
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,9 +58,7 @@ from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
-    """Return measured minus simulated wrench of the first kept trial in six channels: with the body in use, and with
-    the findings.
-    """
+    """Return measured minus simulated wrench of the first kept trial, six channels: as it is, and with the findings."""
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     time = np.arange(len(before)) / rate
@@ -139,8 +137,7 @@ def estimated(one: Estimate) -> str:
     return f"{sized(one.value, one.unit)} (95 % interval {sized(low, one.unit)} to {sized(high, one.unit)})"
 
 
-_CERTAIN = 14.0
-"""Natural logarithm of a million: above it odds are no longer printed."""
+_CERTAIN = 14.0  # Natural logarithm of a million: above it odds are no longer printed
 
 
 def odds(log_bayes_factor: float) -> str:

@@ -88,8 +88,7 @@ def excitation_figure(found: "PerformanceScore") -> str:
     return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
 
 
-_RANKED = 15
-"""Quantities that the figure of pulls and impacts shows."""
+_RANKED = 15  # Quantities that the figure of pulls and impacts shows
 
 
 def impact_figure(found: Sequence[Impact]) -> str:

@@ -176,9 +176,7 @@ def shown(said: str, row: Row) -> str:
 
 
 def plain_values(value: object) -> Any:
-    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
-    None.
-    """
+    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite is None."""
     if type(value) is float:
         return value if math.isfinite(value) else None
     if type(value) is str or type(value) is int or value is None:

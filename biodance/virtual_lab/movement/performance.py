@@ -24,6 +24,7 @@ from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, Role, Wrench, freeze
 from biodance.virtual_lab.movement.posing import (
     COLUMNS,
+    LEGS_APART,
     RAISED,
     SHIFT,
     WIDTH,
@@ -35,13 +36,14 @@ from biodance.virtual_lab.movement.posing import (
     choreograph,
     leg_tops,
     pelvis_height,
+    sit,
     stand_on_feet,
+    take_seat,
     take_stance,
     turn_about,
     upper_body,
 )
 from biodance.virtual_lab.movement.protocol import TrialPlan
-from biodance.virtual_lab.movement.sitting import LEGS_APART, sit, take_seat
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, smooth_noise, stream
 
@@ -49,8 +51,7 @@ NODE_RATE = 100.0
 """Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""
 MARGIN = 0.1
 """s of motion before and after the recording, for late force samples."""
-_ROUNDS = 12
-"""Largest number of balance corrections; 5 to 8 suffice."""
+_ROUNDS = 12  # Largest number of balance corrections; 5 to 8 suffice
 SETTLED = 0.004
 """m: the balance is settled when the zero-moment point is everywhere this close to the place wanted."""
 
