@@ -231,7 +231,10 @@ def design(
     work = replace(alone, checkpoint=checkpoint, workers=workers, tell=tell or alone.tell)
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
-        dance, danced = _followable(work)
+        course, found = safe_course(work)
+        dance = course.dance(work)
+        danced = found.margins(dance)
+        dance = replace(dance, unsafe=broken(danced))
     else:
         dance = optimised_course(work).dance(work)
     work.tell("checking every limit", 0, 0)
@@ -245,11 +248,3 @@ def design(
             f"protocol."
         )
     return dance, margins
-
-
-def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
-    """Return a dance that people can follow, and what imprecise performers leave."""
-    course, found = safe_course(work)
-    dance = course.dance(work)
-    margins = found.margins(dance)
-    return replace(dance, unsafe=broken(margins)), margins

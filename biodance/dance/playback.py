@@ -147,7 +147,8 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
     for frame in range(motion.time.size):
         if frame:
             _advance(mujoco, driver, data, motion, torque, frame)
-        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), driver.place_of(data)))
+        q = np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[driver.q_place]])  # Pinocchio's order
+        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), q))
         for part in driver.touching(data):
             touched.setdefault(part, float(motion.time[frame]))
         if data.qpos[2] < FALLEN * motion.q[frame, 2]:
@@ -190,10 +191,6 @@ class _Driver:
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]
         data.qpos[self.q_place], data.qvel[self.v_place] = q[7:], v[6:]
-
-    def place_of(self, data: Any) -> Array:
-        """Return the configuration (nq,) in Pinocchio's order."""
-        return np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[self.q_place]])
 
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
         """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""

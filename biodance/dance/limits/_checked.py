@@ -101,24 +101,21 @@ class ImpreciseCopy:
         centre = pose.position + np.einsum("tnij,nj->tni", pose.rotation, sip.com)
         pull, change = np.broadcast_to(-np.array(GRAVITY), centre.shape), np.zeros_like(centre)
         if not self.still:
-            out = np.zeros_like(centre)
-            out[1:-1] = (centre[2:] - 2 * centre[1:-1] + centre[:-2]) / self._step**2
-            pull, change = pull + out, self._spin_change(pose)
+            step, turn, acceleration, spin = (
+                float(self.time[1] - self.time[0]),
+                pose.rotation,
+                *np.zeros((2, *centre.shape)),
+            )
+            acceleration[1:-1] = (centre[2:] - 2 * centre[1:-1] + centre[:-2]) / step**2
+            # angular velocity from the rotation over two steps; the change of I w is the moment about the centre
+            spin[1:-1] = _vector(turn[2:] @ np.swapaxes(turn[:-2], -1, -2)) / (2 * step)
+            own = np.array([rigid_inertia(sip.of(name)).inertia for name in self.body.segments])
+            inertia = turn @ own @ np.swapaxes(turn, -1, -2)
+            pull = pull + acceleration
+            change = np.asarray(np.gradient((inertia @ spin[..., None])[..., 0], step, axis=0))
         moment = (np.cross(centre, sip.mass[:, None] * pull) + change).sum(axis=1)
         force = (sip.mass[:, None] * pull).sum(axis=1)
         return np.asarray(np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:])
-
-    @property
-    def _step(self) -> float:
-        return float(self.time[1] - self.time[0])
-
-    def _spin_change(self, pose: Poses) -> Array:
-        """Return the rates (T, N, 3) N·m at which the segments' angular momenta change."""
-        spin = np.zeros_like(pose.position)
-        spin[1:-1] = _vector(pose.rotation[2:] @ np.swapaxes(pose.rotation[:-2], -1, -2)) / (2 * self._step)
-        own = np.array([rigid_inertia(self.body.sip.of(name)).inertia for name in self.body.segments])
-        inertia = pose.rotation @ own @ np.swapaxes(pose.rotation, -1, -2)
-        return np.asarray(np.gradient((inertia @ spin[..., None])[..., 0], self._step, axis=0))
 
     def inside(self, share: float) -> Array:
         """Return how far (T,) m the zero-moment point lies inside the base of support of all feet on the ground, drawn

@@ -68,6 +68,13 @@ def sentences(path: Path, raw: dict[str, Any]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def true_or_false(path: Path, key: str, value: object) -> bool:
+    """Return ``value``; BiodanceError names its ``key`` if it is neither true nor false."""
+    if not isinstance(value, bool):
+        raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
+    return value
+
+
 def finite_number(path: Path, where: str, value: object) -> float:
     """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -253,7 +260,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
     for key in raw:
         refuse_unknown(f"key of {path}", key, _KEYS)
     words = {key: str(raw[name]) for key, name in (("ranges", "ranges"), ("whom", "for")) if name in raw}
-    flags = {name: _flag(path, name, raw[name]) for name in _FLAGS if name in raw}
+    flags = {name: true_or_false(path, name, raw[name]) for name in _FLAGS if name in raw}
     free = flags.pop("free", False)
     fields: dict[str, Any] = (
         ({} if free else dict(_FOLLOWABLE))
@@ -277,12 +284,6 @@ def read_plan(name_or_path: str | Path) -> Plan:
         weights=tuple(weights.items()),
     )
     return replace(plan, limits=_limits(path, raw, {} if free else {"balance": {"share": FOLLOWABLE_SHARE}}), **fields)
-
-
-def _flag(path: Path, key: str, value: object) -> bool:
-    if not isinstance(value, bool):
-        raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
-    return value
 
 
 def _plate(path: Path, value: object) -> tuple[float, float]:

@@ -155,8 +155,9 @@ class MoveObjective:
 
     def __call__(self, state: State) -> tuple[float, Array]:
         """Return the objective and its slopes by x, v, a."""
-        value, slope = off_centre(state)
-        value, slope = CENTRE * value, CENTRE * slope
+        gap = state.zmp - state.stance.centre
+        value = CENTRE * (100 * float(np.mean(np.sum(gap**2, axis=1))))  # dm²
+        slope = CENTRE * (200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes))
         if self.task.blocks.simplicity:
             hard, by = effort(state)
             value, slope = value + self.task.blocks.simplicity * hard, slope + self.task.blocks.simplicity * by
@@ -178,13 +179,6 @@ class MoveObjective:
 def _logarithm(gram: Array) -> tuple[Array, Array]:
     value, slope = condition(gram)
     return np.log(value), slope / value[..., None, None]
-
-
-def off_centre(state: State) -> tuple[float, Array]:
-    """Return the mean squared distance (dm²) of the ZMP from the middle of the support, and its slopes (3, T, n)."""
-    gap = state.zmp - state.stance.centre
-    slopes = 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes)
-    return 100 * float(np.mean(np.sum(gap**2, axis=1))), slopes
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
@@ -323,8 +317,14 @@ def other_moves(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
 
 def _vias(task: Task) -> list[Array]:
     """Return the via points (2, n) that are tried: straight on, on one leg also by lifts that are higher or wider."""
-    lifts = _LIFTS if len(task.stance.planted) == 1 else ()
-    return [task.straight(), *(_lifting(task, lift) for lift in lifts)]
+    limits, out = task.chain.body.limits, [task.straight()]
+    for lift in _LIFTS if len(task.stance.planted) == 1 else ():
+        (side,) = {0, 1} - set(task.stance.planted)
+        columns, via = np.array(task.chain.leg_columns[side]), task.straight()
+        low, high = limits.lower[columns - ROOT] + _FROM_STOP, limits.upper[columns - ROOT] - _FROM_STOP
+        via[:, columns] = np.clip(via[:, columns] + lift, np.minimum(low, via[:, columns]), high)
+        out.append(via)
+    return out
 
 
 def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
@@ -343,16 +343,6 @@ def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], e
             if found > AMPLE:
                 break
     return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
-
-
-def _lifting(task: Task, lift: tuple[float, ...]) -> Array:
-    """Return the via points (2, n) of a straight move on which the free leg does the ``lift`` within its ranges."""
-    via, limits = task.straight(), task.chain.body.limits
-    for side in {0, 1} - set(task.stance.planted):
-        columns = np.array(task.chain.leg_columns[side])
-        low, high = limits.lower[columns - ROOT] + _FROM_STOP, limits.upper[columns - ROOT] - _FROM_STOP
-        via[:, columns] = np.clip(via[:, columns] + lift, np.minimum(low, via[:, columns]), high)
-    return via
 
 
 def _round_about(task: Task, best: Move) -> Move:

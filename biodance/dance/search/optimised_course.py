@@ -183,7 +183,12 @@ def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[Pl
         course = with_exciting_moves(work, replace(course, moves=known, notes=(*course.notes, *notes)), attempt)
     for k, move in enumerate(course.moves):
         if move is not None and move.limit:
-            raise BiodanceError(_impossible(course, k, move.limit))
+            raise BiodanceError(
+                f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({course.stances[k].name} to "
+                f"{course.stances[k + 1].name}) cannot be made: {move.limit.replace('_', ' ')} is exceeded even "
+                "slowly, by way of a posture in between, and with other postures at its ends. Leave these feet out of "
+                "the protocol, or widen that limit."
+            )
     return course
 
 
@@ -237,12 +242,3 @@ def _changed(course: Course[PlainStep], place: int, what: str, limits: dict[int,
         else f"The posture in between after posture {number}"
     )
     return f"{which} was {what}: a move to or from it would have exceeded the limit on {limit.replace('_', ' ')}."
-
-
-def _impossible(course: Course[PlainStep], k: int, limit: str) -> str:
-    feet = f"{course.stances[k].name} to {course.stances[k + 1].name}"
-    return (
-        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({feet}) cannot be "
-        f"made: {limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
-        "postures at its ends. Leave these feet out of the protocol, or widen that limit."
-    )

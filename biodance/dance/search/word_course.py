@@ -152,12 +152,10 @@ class Reachability:
             found = np.array([key[1]])
             if steps:
                 rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
-                found = np.array([t for t in rows if t in near or any(self._steps(int(k), table, t) for k in near)])
+                here = [WordStep(table, int(k), ()) for k in near]
+                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
             self._around[key] = found
         return self._around[key]
-
-    def _steps(self, s: int, table: PostureTable, t: int) -> bool:
-        return self.link(WordStep(table, s, ()), table, t) is not None
 
     def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
         """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
