@@ -2,37 +2,33 @@
 expected accuracy; and the film of one that is played in MuJoCo, as .gif, or as .mp4 where ffmpeg is installed.
 """
 
+import shutil
+import subprocess
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.dance.playback import Rehearsal
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, spaced
+from biodance.errors import BiodanceError, MissingLibrary
+from biodance.lab.plain_text import whole_file
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines, silhouettes
 from biodance.records import Array, side_in_name
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
+from biodance.report.files import refuse_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from PIL.Image import Image
 
     from biodance.dance.expectation import Expectation
     from biodance.dance.verify import ZmpPath
-import shutil
-import subprocess
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from biodance.dance.playback import Rehearsal
-from biodance.errors import BiodanceError, MissingLibrary
-from biodance.lab.plain_text import whole_file
-from biodance.report.files import refuse_file
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 
 _COLUMNS = 10
@@ -128,13 +124,8 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
                 ]
                 share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
                 style = ("-", "--", ":")[number // len(colours) % 3]
-                axes.plot(
-                    expectation.duration,
-                    share,
-                    style,
-                    color=colours[number % len(colours)],
-                    label=spaced(kind),
-                )
+                colour = colours[number % len(colours)]
+                axes.plot(expectation.duration, share, style, color=colour, label=spaced(kind))
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")
         drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(kinds), 4))
@@ -195,18 +186,8 @@ def _write(frames: "list[Image]", part: Path, out: Path) -> None:
         small = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
         small[0].save(part, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
         return
-    words = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += [
-        "-s",
-        f"{frames[0].width}x{frames[0].height}",
-        "-r",
-        str(_RATE),
-        "-i",
-        "-",
-        "-pix_fmt",
-        "yuv420p",
-        str(part),
-    ]
+    size, form = f"{frames[0].width}x{frames[0].height}", "-y -loglevel error -f rawvideo -pix_fmt rgb24"
+    words = ["ffmpeg", *f"{form} -s {size} -r {_RATE} -i - -pix_fmt yuv420p".split(), str(part)]
     done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
     if done.returncode:
         raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")

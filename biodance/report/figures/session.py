@@ -31,6 +31,7 @@ from biodance.report.figures.vector import (
     points,
     rule,
     segments,
+    with_legend,
 )
 from biodance.report.wording import format_number, millimetres
 
@@ -124,8 +125,7 @@ def standing_figure(standing: QuietStanding) -> str:
     words = ["black point: centre of pressure (plates)"]
     words += ["green ring: centre of mass (table)"] if tracked else []
     words += ["blue points: right foot's markers", "orange rings: left foot's"]
-    legend = "".join(f"<span>{word}</span>" for word in words)
-    return f'<div class="legend">{legend}</div><div class="cells">{wide}{near}</div>'
+    return with_legend(words, (wide, near))
 
 
 def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: NDArray[np.bool_]) -> list[list[Strip]]:

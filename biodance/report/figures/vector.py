@@ -161,8 +161,11 @@ def rule(axis: Axis, value: float, *, upright: bool, look: Stroke = Stroke(GREY,
     return f'<path class="rule" {look.attributes} d="{d}"/>'
 
 
-def points(x: Axis, y: Axis, across: Array, up: Array, look: Stroke, *, size: float = 6.0, inside: str = "") -> str:
-    """Return round points of ``size`` px at (n,) places, filled with ``inside`` ("" = the look's colour)."""
+def points(
+    x: Axis, y: Axis, across: Array | float, up: Array | float, look: Stroke, *, size: float = 6.0, inside: str = ""
+) -> str:
+    """Return round points of ``size`` px at one or (n,) places, filled with ``inside`` ("" = the look's colour)."""
+    across, up = np.atleast_1d(across, up)
     finite = np.isfinite(across) & np.isfinite(up)
     if not finite.any():
         return ""
@@ -348,6 +351,12 @@ class CurveFigure:
         grey = '<span><i class="swatch out"></i>left out: not fully measured</span>' if left_out else ""
         grey += '<span><i class="swatch filled"></i>filled: markers put into a gap</span>' if filled else ""
         return buttons + (f'<span><i class="swatch in"></i>{escape(self.band)}</span>' if banded else "") + grey
+
+
+def with_legend(words: Iterable[str], panels: Iterable[str]) -> str:
+    """Return panels beside each other below a legend of ``words``."""
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{"".join(panels)}</div>'
 
 
 def swatch(look: Stroke) -> str:

@@ -123,7 +123,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     for i, name in enumerate(order):
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
         marks.append(segments(x, y, np.array([[value.min(), i], [value.max(), i]]), Stroke(GREY, "", 2.5)))
-        marks.append(points(x, y, np.array([np.median(value)]), np.array([float(i)]), Stroke(BLUE)))
+        marks.append(points(x, y, np.median(value), i, Stroke(BLUE)))
     about = "per kind of cause the smallest size that this session would have seen"
     drawn = panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
     return f'<div class="single">{drawn}</div>'

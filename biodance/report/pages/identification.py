@@ -1,6 +1,6 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,7 @@ from biodance.report.figures.vector import (
     rule,
     segments,
     shade,
+    with_legend,
 )
 from biodance.report.pages.template import render
 from biodance.report.tables.identification import (
@@ -74,7 +75,7 @@ def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference
             look = Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
             marks.append(segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
             inside = "" if row.known else "#fff"
-            marks.append(points(x, y, np.array([factor * row.value]), np.array([at]), look, inside=inside))
+            marks.append(points(x, y, factor * row.value, at, look, inside=inside))
         drawn.append(panel(x, y, marks, title, frame=Frame(height=17.0 * len(names), left=112.0, above=4.0)))
     return f'<div class="cells">{"".join(drawn)}</div>'
 
@@ -106,21 +107,16 @@ def impact_figure(found: Sequence[Impact]) -> str:
     right = []
     for (at, _), row in zip(ticks, rows, strict=True):
         ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
-        left += [segments(pulled, y, ends, Stroke(BLACK)), _point(pulled, y, row.pull, at, Stroke(BLACK))]
+        left += [segments(pulled, y, ends, Stroke(BLACK)), points(pulled, y, row.pull, at, Stroke(BLACK))]
         knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
         right += [segments(moment, y, knee, Stroke(GREEN, "", 2.0)), segments(moment, y, hip, Stroke(PINK, "4 2", 2.0))]
-        right += [_point(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
-        right += [_point(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
+        right += [points(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
+        right += [points(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
     frame = Frame(height=ROW * len(rows), left=138.0, above=4.0)
-    drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
-    drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
+    pulls = panel(pulled, y, left, "pull of every quantity", frame=frame)
+    impacts = panel(moment, y, right, "impact on knee and hip", frame=frame)
     words = ("grey: one prior standard deviation", "green point: knee flexion", "pink ring: hip flexion")
-    legend = "".join(f"<span>{word}</span>" for word in words)
-    return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
-
-
-def _point(x: Axis, y: Axis, across: float, up: float, look: Stroke, *, inside: str = "") -> str:
-    return points(x, y, np.array([across]), np.array([up]), look, inside=inside)
+    return with_legend(words, (pulls, impacts))
 
 
 _SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
@@ -169,11 +165,6 @@ LISTED = "Cannot be known"
 _SCHEMAS = {"segment": SEGMENT_ROW, "torque": TORQUE_ROW, "suspect": SUSPECT_ROW, "difference": DIFFERENCE_ROW}
 
 
-def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
-    rows = DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
-    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
-
-
 _METHODS = Schema(
     "segment table posterior paper",
     shown="segment: {segment:name} | table (kg): {table[0]:2} | posterior (kg): {posterior[0]:2} | paper (kg): "
@@ -216,7 +207,7 @@ def identification_section(found: SessionIdentification) -> str:
     one, sure = found.identification, certain_changes(found.changes)
     drawn, paper = (found.posterior.identification, one) if found.posterior else (one, None)
     carried = (found.search.best.segment, found.search.best.mass) if found.search.found else None
-    rows = segments_document(one)
+    rows, masses = segments_document(one), DIFFERENCE_ROW.rows(row for row in found.changes if row.quantity == "mass")
     return render(
         "identification.html.j2",
         filters={"spaced": spaced, "changed": changed, "signed": signed},
@@ -244,7 +235,7 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         suspects=SUSPECT_ROW.rows(found.search.suspects),
-        changes=_mass_changes(found.changes),
+        changes=[row if row["known"] else row | {"p": "cannot be known"} for row in masses],
         comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),
