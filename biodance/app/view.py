@@ -37,7 +37,10 @@ def markers_document(trial: Trial) -> dict[str, Any]:
     markers = trial.markers
     if markers is None or not markers.seen.any():
         return {"names": [], "frames": 0}
-    filled = _as_filled(trial, markers)
+    worn = read_marker_set(trial.marker_set) if trial.marker_set else None
+    match = worn.match(markers.names).items() if worn else ()
+    segments = {label: worn.marker(own).segment for own, label in match if worn}
+    filled = fill_gaps(markers, segments)[0]  # as a run would fill them
     chosen = np.arange(0, markers.time.size, max(1, -(-markers.time.size // _FRAMES)))
     xyz = filled.xyz[chosen]
     origin = np.nanmean(markers.xyz, axis=(0, 1)).round(4)
@@ -59,15 +62,6 @@ def markers_document(trial: Trial) -> dict[str, Any]:
             }
         )
     )
-
-
-def _as_filled(trial: Trial, markers: Markers) -> Markers:
-    """Return the markers with their gaps filled as a run would fill them."""
-    if not trial.marker_set:
-        return fill_gaps(markers, {})[0]
-    worn = read_marker_set(trial.marker_set)
-    segments = {label: worn.marker(own).segment for own, label in worn.match(markers.names).items()}
-    return fill_gaps(markers, segments)[0]
 
 
 def _spans(markers: Markers, mask: Any) -> dict[str, list[list[float]]]:

@@ -64,7 +64,8 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     scale = np.zeros((len(joints), len(markers.names)))
     swing = np.zeros(len(markers.names))
     for k, (name, segment) in enumerate(zip(markers.names, markers.segment, strict=True)):
-        kind, side = _kind_and_side(TRUE_SEGMENTS[segment], name)
+        kind = next((k for k in ARM_AND_LEG if TRUE_SEGMENTS[segment].endswith(k)), TRUE_SEGMENTS[segment])
+        side = "right" if name.startswith("R") else "left"
         pulls = dict(virtual_people()["pull_mm_rad"][kind])
         if name.endswith(("SHO", "BAK")):
             pulls |= SHOULDER_PULL
@@ -90,12 +91,6 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     )
     pull = pulled * tolerances.soft_tissue * scale[..., None] * direction
     return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
-
-
-def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
-    """Return the kind of a true segment, and the side of the body a marker lies on."""
-    kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
-    return kind, "right" if marker.startswith("R") else "left"
 
 
 def reference_angles(person: Person) -> Array:
@@ -249,13 +244,6 @@ def lay_plate(
     return TruePlate(corners, true_turn, place, mixing, zero, side)
 
 
-def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
-    """Return the true wrench (T, 6) about the lab origin under one foot, under "both" or "none"."""
-    if side == "none":
-        return np.zeros((time.size, 6))
-    return performance.wrench(time).value if side == "both" else performance.foot_wrench(time, side)
-
-
 def sense_plate(
     performance: Performance,
     plate: TruePlate,
@@ -269,7 +257,12 @@ def sense_plate(
 
     ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
     """
-    value = contact_wrench(performance, time - tolerances.plate_delay, plate.side)
+    late = time - tolerances.plate_delay
+    if plate.side == "none":
+        value = np.zeros((time.size, 6))
+    else:  # about the lab origin, under one foot or both
+        both = plate.side == "both"
+        value = performance.wrench(late).value if both else performance.foot_wrench(late, plate.side)
     force, moment = value[:, :3] @ tilt.T, value[:, 3:] @ tilt.T
     at_centre = moment - np.cross(plate.centre, force)
     force, moment = force @ plate.turn, at_centre @ plate.turn

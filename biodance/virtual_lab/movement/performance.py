@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import gaussian_filter1d
+from scipy.linalg import solve_banded
+from scipy.ndimage import correlate1d, gaussian_filter1d
 from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
@@ -84,8 +85,6 @@ class Performance:
 
     @cached_property
     def _wrench_spline(self) -> Any:
-        from scipy.interpolate import make_interp_spline
-
         time = np.arange(self.node_time[0], self.node_time[-1] + 1e-9, 0.5 / NODE_RATE)
         time = time[time <= self.node_time[-1]]
         needed = true_wrench(self.person, self.motion(time)).value
@@ -178,24 +177,14 @@ def keep_balance(
         if np.abs(error).max() < SETTLED:
             break
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
-        from scipy.ndimage import correlate1d
-
-        xy = xy - 0.95 * np.asarray(
-            correlate1d(
-                _pendulum(error, pendulum, 1.0 / NODE_RATE),
-                np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0,
-                axis=0,
-                mode="nearest",
-            )
-        )
+        moved, smooth = _pendulum(error, pendulum, 1.0 / NODE_RATE), np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0
+        xy = xy - 0.95 * np.asarray(correlate1d(moved, smooth, axis=0, mode="nearest"))
         q = stand_on_feet(person, pose, curves, stance, xy, height=height)
     return q, float(np.abs(error).max())
 
 
 def _pendulum(right: Array, h: Array, step: float) -> Array:
     """Solve d - h d'' = right (T, 2) for d with d' = 0 at both ends; ``h`` (T,) s², ``step`` s."""
-    from scipy.linalg import solve_banded
-
     k = h / step**2
     bands = np.stack([np.roll(-k, 1), 1 + 2 * k, np.roll(-k, -1)])
     bands[0, 1], bands[2, -2] = -2 * k[0], -2 * k[-1]
@@ -204,8 +193,6 @@ def _pendulum(right: Array, h: Array, step: float) -> Array:
 
 def _splines(time: Array, q: Array) -> tuple[Any, Any, Any]:
     """Return the quintic spline through q and its first two derivatives."""
-    from scipy.interpolate import make_interp_spline
-
     spline = make_interp_spline(time, q, k=5)
     return spline, spline.derivative(1), spline.derivative(2)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
@@ -62,8 +63,6 @@ def _there_and_back(time: Array, step: ProtocolStep) -> Array:
     fine = np.linspace(0.0, count + 1.0, 400 * (count + 1) + 1)
     pace = septic(fine) * septic(count + 1.0 - fine)
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]) * np.diff(fine))])
-    from scipy.interpolate import CubicSpline
-
     turned = CubicSpline(fine, phase * count / phase[-1])(np.clip(x, 0.0, count + 1.0))
     return 0.5 - 0.5 * np.cos(2 * np.pi * turned)
 
