@@ -5,7 +5,6 @@ words can make on given feet, with the pelvis where it keeps the balance.
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +100,14 @@ def read_vocabulary() -> Vocabulary:
         raise BiodanceError(f"{path}: groups {', '.join(sorted(raw))}; expected {', '.join(_GROUPS)}.")
     found = {}
     for group in _GROUPS:
-        words = [_word(f"{path}: {group}.{key}", key, raw[group][key]) for key in raw[group]]
+        words = list[Word]()
+        for key, said in raw[group].items():
+            if unknown := set(said) - set(_KEYS):
+                legal = ", ".join(_KEYS)
+                raise BiodanceError(f"{path}: {group}.{key}: unknown key {sorted(unknown)[0]!r}; legal are {legal}.")
+            angles = tuple((joint, float(np.radians(angle))) for joint, angle in said.get("angles", {}).items())
+            flags = {name: bool(said.get(name, False)) for name in _FLAGS}
+            words.append(Word(key, str(said["name"]), angles, str(said.get("mirror", key)), **flags))
         words.sort(key=lambda word: not word.rest)
         keys = [word.key for word in words]
         if [word.rest for word in words] != [True] + [False] * (len(words) - 1):
@@ -122,14 +128,6 @@ def posture_phrases() -> tuple[str, ...]:
     for text in (*texts, _FREE_ARM):
         out += [singular(text.format(side)) if side != "both" else text.format(side) for side in sides]
     return tuple(dict.fromkeys(part for one in (*out, IN_PART) for part in one.split(", ")))
-
-
-def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
-    if unknown := set(raw) - set(_KEYS):
-        raise BiodanceError(f"{where}: unknown key {sorted(unknown)[0]!r}; legal are {', '.join(_KEYS)}.")
-    angles = tuple((joint, float(np.radians(angle))) for joint, angle in raw.get("angles", {}).items())
-    flags = {name: bool(raw.get(name, False)) for name in _FLAGS}
-    return Word(key, str(raw["name"]), angles, str(raw.get("mirror", key)), **flags)
 
 
 def groups_of(stance: Stance) -> dict[str, str]:
@@ -234,19 +232,15 @@ def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
 
 def _within(body: Body, plan: Plan, part: str, word: Word) -> dict[str, float]:
     """Return the angles of all joints of a part, as near to a word as ranges and limits let them be."""
-    angles = dict.fromkeys(_joints_of(body, part), 0.0) | dict(word.angles)
+    side, _, group = part.rpartition("_")
+    names = (joint.name for joint in body.joints)
+    own = (name.removeprefix(f"{side}_") for name in names if not side or name.startswith(f"{side}_"))
+    # what a word does not name is straight, as far as it goes
+    angles = dict.fromkeys((name for name in own if name.startswith(_JOINTS[group])), 0.0) | dict(word.angles)
     near = {own_joint(part, joint): _near(body, part, joint, angle) for joint, angle in angles.items()}
     for limit in plan.limits:
         near = limit.eased(near)
     return {joint: near[own_joint(part, joint)] for joint in angles}
-
-
-def _joints_of(body: Body, part: str) -> tuple[str, ...]:
-    """Return the joints of a part, without its side: what a word does not name is straight, as far as it goes."""
-    side, _, group = part.rpartition("_")
-    names = (joint.name for joint in body.joints)
-    own = (name.removeprefix(f"{side}_") for name in names if not side or name.startswith(f"{side}_"))
-    return tuple(name for name in own if name.startswith(_JOINTS[group]))
 
 
 def _short_of(body: Body, plan: Plan, part: str, word: Word) -> str:

@@ -258,7 +258,10 @@ class WordSearch:
 
     def __post_init__(self) -> None:
         plan = self.work.plan
-        self.reachability = Reachability(self.work, self._can)
+        self.reachability = Reachability(
+            self.work,
+            lambda last, step: not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit),
+        )
         self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
 
     def course(self, stances: tuple[Stance, ...]) -> Course[WordStep]:
@@ -296,14 +299,6 @@ class WordSearch:
             if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
-
-    def never_kept(self, course: Course[WordStep]) -> tuple[str, ...]:
-        """Return in sentences the words that a person with own limits can do on none of the feet of a course."""
-        if not self.work.plan.careful:
-            return ()
-        tables = {feet_key(one): self.reachability.table(one) for one in course.stances if one.over is None}
-        found = [words_never_kept(table, self.work.plan.limits) for table in tables.values()]
-        return tuple(sentence for one in found for sentence in one)
 
     def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
         """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
@@ -399,9 +394,6 @@ class WordSearch:
             self._held[step.key] = found, limit if found < self.enough else ""
         return self._held[step.key]
 
-    def _can(self, last: WordStep, step: WordStep) -> bool:
-        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
-
     def move(self, last: WordStep, step: WordStep) -> Move:
         """Return the move from one step to the next, as `straight_move` finds it."""
         return self._judged_move(last, step)[0]
@@ -448,11 +440,11 @@ def word_course(search: WordSearch) -> Course[WordStep]:
             notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
         else:
-            lacking = (
-                *words_left_out(body, plan, course.stances, search.reachability.words),
-                *search.never_kept(course),
-            )
-            return replace(course, notes=tuple(dict.fromkeys((*notes, *lacking))))
+            notes += words_left_out(body, plan, course.stances, search.reachability.words)
+            if plan.careful:  # the words that a person with own limits can do on none of the feet
+                tables = {feet_key(one): search.reachability.table(one) for one in course.stances if one.over is None}
+                notes += (said for one in tables.values() for said in words_never_kept(one, plan.limits))
+            return replace(course, notes=tuple(dict.fromkeys(notes)))
 
 
 def freer_dance(body: Body, plan: Plan, *, seed: int = 0, stances: tuple[Stance, ...] = ()) -> Dance:

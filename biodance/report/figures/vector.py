@@ -307,22 +307,15 @@ class CurveFigure:
         shades += [shade(x, float(self.time[a]), float(self.time[b - 1]), kind="filled") for a, b in filled]
         cells = "".join(f'<div class="cell">{self._cell(x, strips, shades)}</div>' for strips in self.cells)
         trial = f' data-trial="{escape(self.trial)}"' if self.trial else ""
-        trial += self._first_view(x)
+        if self.used is not None and 0 < self.used.mean() < _MUCH:  # where much is left out, the rest is seen first
+            first, last = x.steps(self.time[np.flatnonzero(self.used)[[0, -1]]]).tolist()
+            room = max((last - first) // 4, STEPS // 100)
+            trial += f' data-view="{max(0, first - room)} {min(STEPS, last + room)}"'
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
             f'<div class="legend">{self._legend(bool(left_out), bool(filled))}</div><p class="reading"></p>'
             f'<div class="cells{" three" * (self.width < _THREE)}">{cells}</div></div>'
         )
-
-    def _first_view(self, x: Axis) -> str:
-        """Return the steps that are seen first, as an attribute: where much is left out, the rest with its
-        surroundings; "" for all.
-        """
-        if self.used is None or not 0 < self.used.mean() < _MUCH:
-            return ""
-        first, last = x.steps(self.time[np.flatnonzero(self.used)[[0, -1]]]).tolist()
-        room = max((last - first) // 4, STEPS // 100)
-        return f' data-view="{max(0, first - room)} {min(STEPS, last + room)}"'
 
     def _cell(self, x: Axis, strips: Sequence[Strip], shades: list[str]) -> str:
         out = []

@@ -13,7 +13,6 @@ from biodance.body.body import Body
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.summary import KeySummary, Repetitions
 from biodance.display import BLACK, BLUE, GREY, spaced
-from biodance.lab.session.file import VisitEntry
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.pipeline.still import silhouettes
@@ -245,6 +244,9 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
     from markupsafe import Markup
 
     visit, words = account.visit, read_language(language)
+    whom = visit.operator or visit.lab or words.say("the lab")
+    if visit.operator and visit.lab:
+        whom = words.say("%(person)s at %(lab)s", person=visit.operator, lab=visit.lab)
     facts = ((N_("Lab"), visit.lab), (N_("Done by"), visit.operator), (N_("Date"), words.date(visit.date)))
     return render(
         "subject.html.j2",
@@ -254,7 +256,7 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
         account=account,
         moved=plain_movement(account.moved, words) if account.moved else None,
         facts=[(words.say(what), value) for what, value in facts if value],
-        who=_whom_to_ask(visit, words),
+        who=whom,
         parts=[(_name(part, words), kilograms(part, words), part) for part in account.parts],
         picture=_picture(account, words, _WIDE),
         small_picture=_picture(account, words, _PHONE),
@@ -262,12 +264,6 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
         together=(_name(account.together, words), kilograms(account.together, words)) if account.together else None,
         reasons=plain_reasons(account.withheld, words),
     )
-
-
-def _whom_to_ask(visit: VisitEntry, words: Language) -> str:
-    if visit.operator and visit.lab:
-        return words.say("%(person)s at %(lab)s", person=visit.operator, lab=visit.lab)
-    return visit.operator or visit.lab or words.say("the lab")
 
 
 def _picture(account: SubjectAccount, words: Language, room: _Room) -> str:
