@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from biodance import display
 from biodance.body.body import Body, body_text, parse_body
-from biodance.dance.limits._checked import Margin
+from biodance.dance.limits import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import Phase, path_in, phase_at
 from biodance.dance.problem.stance import Stance, stance_fields

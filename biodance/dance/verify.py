@@ -13,7 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit
-from biodance.dance.limits._checked import Margin as Margin
+from biodance.dance.limits import Margin as Margin
 from biodance.dance.problem.excitation import (
     condition,
     dynamic_grams,
