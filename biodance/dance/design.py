@@ -210,7 +210,7 @@ def design(
 
     ``limits`` are kept beside those of the plan, or in place of one of the same name; ``tell`` is told the progress;
     with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers`` run the
-    searches (default: two processes). Raises BiodanceError: there is no such dance: the message names the posture or
+    searches (default: two processes). Raises BiodanceError: there is no such dance; the message names the posture or
     move and the limit that forbids it.
     """
     if workers is None:

@@ -130,7 +130,7 @@ def design_robot(
     resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and
-    what is left of every limit; see `design.design`. Raises BiodanceError: there is no such dance: the message names
+    what is left of every limit; see `design.design`. Raises BiodanceError: there is no such dance; the message names
     the posture or move and the limit that forbids it.
     """
     plan, to = plan.with_limits(limits), person_sized(body)

@@ -126,10 +126,8 @@ def _foot(sex: Sex) -> RigidInertia:
 def dumas(subject: Subject) -> Reference:
     """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder in de Leva's proportion."""
     sex = subject.sex
-    height, forearm = (
-        float(_shipped("dumas_2018").provenance["reference_stature_m"][sex]),
-        _dumas_length("forearm", sex),
-    )
+    height = float(_shipped("dumas_2018").provenance["reference_stature_m"][sex])
+    forearm = _dumas_length("forearm", sex)
     lengths = {kind: _dumas_length(kind, sex) for kind in ("pelvis", "thigh", "shank", "upper_arm")}
     lengths |= {"forearm_hand": forearm, "foot": proportion("foot_length", sex) * height}
     lengths["trunk_head"] = length("trunk_3", sex) / _de_leva_stature(sex) * height
