@@ -37,9 +37,10 @@ def markers_document(trial: Trial) -> dict[str, Any]:
     markers = trial.markers
     if markers is None or not markers.seen.any():
         return {"names": [], "frames": 0}
-    worn = read_marker_set(trial.marker_set) if trial.marker_set else None
-    match = worn.match(markers.names).items() if worn else ()
-    segments = {label: worn.marker(own).segment for own, label in match if worn}
+    segments: dict[str, str] = {}
+    if trial.marker_set:
+        worn = read_marker_set(trial.marker_set)
+        segments = {label: worn.marker(own).segment for own, label in worn.match(markers.names).items()}
     filled = fill_gaps(markers, segments)[0]  # as a run would fill them
     chosen = np.arange(0, markers.time.size, max(1, -(-markers.time.size // _FRAMES)))
     xyz = filled.xyz[chosen]
