@@ -1,6 +1,6 @@
 """FAMILY: one constraint of a dance per file, found automatically; others come as objects or by the entry points
-``biodance.limits``. With them a motion as the check of every limit sees it, nothing of the design's coordinates; what is
-left of a limit; and a copy by somebody imprecise, as what a limit demands of such people sees it.
+``biodance.limits``. With them a motion as the check of every limit sees it, nothing of the design's coordinates; what
+is left of a limit; and a copy by somebody imprecise, as what a limit demands of such people sees it.
 
 A member is a frozen dataclass that derives from `Limit`, given as ``LIMIT`` by its file: its numbers are fields
 (``[limits.friction] mu = 0.4`` in a protocol), ``margins`` is for the optimiser, ``check`` judges the finished motion
