@@ -170,10 +170,7 @@ def _accepted(
     write. Only what is proven to gain on data that were not used is taken off or believed.
     """
     name, undone = f"session {result.session.folder.name}", found.mended.checks if found.mended else ()
-    # those faults that no check put right in a copy already
-    right = {(check.effect, check.target) for check in (*undone, *(c for c in found.diagnosis.checks if c.mended))}
-    findings = tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
-    proven = _is_proven(found)
+    findings, proven = _not_put_right(found, undone), _is_proven(found)
     copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
     files = _accepted_body(found, findings, name) | _lab_file(earlier, made)
@@ -192,6 +189,13 @@ def _accepted(
         "not_applied": [{"cause": cause_name(names), "why": why} for names, why in left.items()],
     }
     return document, {file: text for file, (text, _) in files.items()}
+
+
+def _not_put_right(found: SessionDiagnosis, undone: Sequence[QualityCheck]) -> tuple[Finding, ...]:
+    """Return the faults that no check put right in a copy already."""
+    checks = (*undone, *(check for check in found.diagnosis.checks if check.mended))
+    right = {(check.effect, check.target) for check in checks}
+    return tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
 
 
 def _is_proven(found: SessionDiagnosis) -> bool:

@@ -1,6 +1,6 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -200,6 +200,11 @@ def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tu
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
 
 
+def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
+    rows = DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
+    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
+
+
 def identification_section(found: SessionIdentification) -> str:
     """Return the sections as HTML text; the same argument gives the same characters."""
     from markupsafe import Markup
@@ -207,7 +212,7 @@ def identification_section(found: SessionIdentification) -> str:
     one, sure = found.identification, certain_changes(found.changes)
     drawn, paper = (found.posterior.identification, one) if found.posterior else (one, None)
     carried = (found.search.best.segment, found.search.best.mass) if found.search.found else None
-    rows, masses = segments_document(one), DIFFERENCE_ROW.rows(row for row in found.changes if row.quantity == "mass")
+    rows = segments_document(one)
     return render(
         "identification.html.j2",
         filters={"spaced": spaced, "changed": changed, "signed": signed},
@@ -235,7 +240,7 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         suspects=SUSPECT_ROW.rows(found.search.suspects),
-        changes=[row if row["known"] else row | {"p": "cannot be known"} for row in masses],
+        changes=_mass_changes(found.changes),
         comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),
