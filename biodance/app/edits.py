@@ -62,8 +62,14 @@ class SessionText:
         return at > 0 or changed, at < len(states) - 1 and not changed
 
     def change(self, changes: Sequence[KeyChange], revision: str) -> None:
-        """Change keys of the file, which must be as at the ``revision``; comments and order stay. Raises
-        ChangedElsewhereError: it is not. BiodanceError: What would stand there is not legal: nothing is written.
+        """Change keys of the file, which must be as at the ``revision``; comments and order stay.
+
+        Raises
+        ------
+        ChangedElsewhereError
+            It is not.
+        BiodanceError
+            What would stand there is not legal: nothing is written.
         """
         with self._lock:
             self._same(revision)

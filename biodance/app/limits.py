@@ -57,8 +57,14 @@ def limits_form() -> dict[str, Any]:
 
 def limits_text(template: str, values: Mapping[str, Any]) -> str:
     """Return the file of what was filled in (``values`` by the keys of the file, each side by itself): a template's,
-    with its comments where they still hold. Raises UnknownName: there is no such template, or no such key.
-    BiodanceError: a value is not legal; the message says which, and what would be.
+    with its comments where they still hold.
+
+    Raises
+    ------
+    UnknownName
+        There is no such template, or no such key.
+    BiodanceError
+        A value is not legal; the message says which, and what would be.
     """
     legal = (_NOBODY, *names(_TEMPLATES))
     refuse_unknown("template of limits", template, legal)

@@ -184,7 +184,13 @@ class Worker:
         self._thread: threading.Thread | None = None
 
     def start(self, places: Sequence[SessionPlace]) -> None:
-        """Begin a run over some sessions. Raises BiodanceError: another run is not finished."""
+        """Begin a run over some sessions.
+
+        Raises
+        ------
+        BiodanceError
+            Another run is not finished.
+        """
         with self._lock:
             if self.running:
                 raise BiodanceError("Another run is not finished. Wait for it, or stop it.")

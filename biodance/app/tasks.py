@@ -56,8 +56,12 @@ _Finding = Mapping[str, Any]
 
 def proposed_correction(folder: Path, findings: Sequence[_Finding]) -> dict[str, Any]:
     """Return the ``changes`` of session.toml that take ``findings`` off, as the last run told them, and what they
-    change: ``residuals`` as `residual_rows`. Raises BiodanceError: session.toml cannot correct one of them, or it is
-    not found any more.
+    change: ``residuals`` as `residual_rows`.
+
+    Raises
+    ------
+    BiodanceError
+        session.toml cannot correct one of them, or it is not found any more.
     """
     before = examine(read_session(folder))
     changes = [change for one in findings for change in CORRECTIONS[SessionEntry(one["session_entry"])](before, one)]
@@ -160,9 +164,12 @@ _OF_MASSES = ("margin_aside", "margin_ahead", "vertical_stiffness")
 def stride_rows(results: Path, session: Path, trial: str, stem: str) -> list[dict[str, Any]]:
     """Return the spatio-temporal values of a ``trial`` (file ``stem``), but `_OF_MASSES`, by ``quantity``, ``unit`` and
     ``side``: ``before``, the mean of the last run, in ``results``, and ``after`` over ``count`` strides, with the
-    events and the spans left out that the session.toml of the ``session`` says now; None = no value. Raises
-    BiodanceError: the last run gave no motion of the trial, or found the events of a foot by hand that session.toml
-    says no more.
+    events and the spans left out that the session.toml of the ``session`` says now; None = no value.
+
+    Raises
+    ------
+    BiodanceError
+        The last run gave no motion of the trial, or found the events of a foot by hand that session.toml says no more.
     """
     document = parse_json((results / "results.json").read_text(encoding="utf-8"))
     moved = [one for one in (document["movement"] or {"trials": []})["trials"] if one["trial"] == trial]

@@ -29,8 +29,12 @@ if TYPE_CHECKING:
 
 
 def load_pinocchio() -> Any:
-    """Import pinocchio. Raises MissingLibrary: it does not load; on slim Linux containers the cause is the absent
-    system library libgomp1.
+    """Import pinocchio.
+
+    Raises
+    ------
+    MissingLibrary
+        It does not load; on slim Linux containers the cause is the absent system library libgomp1.
     """
     try:
         import pinocchio
@@ -275,8 +279,12 @@ def body_text(body: Body, source: str) -> str:
 
 
 def read_body(path: str | Path) -> tuple[Body, str]:
-    """Return the body of a file that ``body_text`` made, and its source. Raises FileRefused: the file cannot be read,
-    is of another version, or is not such a file.
+    """Return the body of a file that ``body_text`` made, and its source.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is of another version, or is not such a file.
     """
     refuse_special(Path(path))
     try:
@@ -287,8 +295,12 @@ def read_body(path: str | Path) -> tuple[Body, str]:
 
 
 def parse_body(text: str, where: str) -> tuple[Body, str]:
-    """Return the body and its source from the ``text`` of `body_text`; ``where`` it was found, for messages. Raises
-    FileRefused: the text is of another version or is not such a body.
+    """Return the body and its source from the ``text`` of `body_text`; ``where`` it was found, for messages.
+
+    Raises
+    ------
+    FileRefused
+        The text is of another version or is not such a body.
     """
     try:
         raw: dict[str, Any] = parse_json(text)

@@ -44,8 +44,12 @@ def standing_frames(body: Body) -> Body:
     """Return ``body`` with its feet in ISB axes: y along the sole's normal, x forwards at zero angles, origin where the
     last two axes meet.
 
-    The root must be in ISB axes already (`urdf.read_urdf` sees to it). Raises BiodanceError: a sole is not under its
-    foot at zero joint angles.
+    The root must be in ISB axes already (`urdf.read_urdf` sees to it).
+
+    Raises
+    ------
+    BiodanceError
+        A sole is not under its foot at zero joint angles.
     """
     for side in SIDES:
         foot = body.feet[side]

@@ -72,7 +72,11 @@ def _head_in(box: Array, height: float) -> Array:
 
 def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
     """Return the mesh in a file, all its parts as one, times ``scale`` (one number or (3,): m per unit of the file).
-    Raises FileRefused: the file is missing, of no known format, damaged, or holds no triangles.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, of no known format, damaged, or holds no triangles.
     """
     import trimesh
 
@@ -97,8 +101,12 @@ def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "T
     """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solids in its
     `shape_parts`.
 
-    Segments whose box is empty have none. Raises FileRefused: the folder is missing, holds a mesh that is named like no
-    segment or two for one, or a mesh cannot be read.
+    Segments whose box is empty have none.
+
+    Raises
+    ------
+    FileRefused
+        The folder is missing, holds a mesh that is named like no segment or two for one, or a mesh cannot be read.
     """
     from trimesh import Trimesh
     from trimesh.util import concatenate

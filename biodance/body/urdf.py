@@ -62,9 +62,15 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
     ``mend`` takes, in place of a link that is no possible body, a solid box around its shapes, and notes it.
 
     Links without mass carry no segment. Prior standard deviations: those of a data sheet (`robot_prior`). Speeds,
-    ranges and efforts are the file's. No markers. Raises UnknownName: a foot is no link of the file. FileRefused: the
-    file says something that a body cannot be, or lacks something; the message names the link or joint and what would be
-    legal.
+    ranges and efforts are the file's. No markers.
+
+    Raises
+    ------
+    UnknownName
+        A foot is no link of the file.
+    FileRefused
+        The file says something that a body cannot be, or lacks something; the message names the link or joint and what
+        would be legal.
     """
     file = read_urdf_file(path)
     for foot in feet:

@@ -27,8 +27,12 @@ def mesh_file(urdf: Path, name: str) -> Path:
     """Return the file that a mesh's ``filename`` means: a path beside the URDF, or ``package://NAME/PATH`` in a folder
     above it.
 
-    The package is looked for by its name in all folders that hold the URDF, and as one of these folders itself. Raises
-    FileRefused: there is no such file; the message says where it was looked for.
+    The package is looked for by its name in all folders that hold the URDF, and as one of these folders itself.
+
+    Raises
+    ------
+    FileRefused
+        There is no such file; the message says where it was looked for.
     """
     plain = name.removeprefix("file://").removeprefix("model://")
     places = [urdf.parent / plain]
@@ -193,8 +197,13 @@ class UrdfFile:
 
 
 def read_urdf_file(path: str | Path) -> UrdfFile:
-    """Return what a URDF file says. Raises FileRefused: the file cannot be read, is no URDF, or a link or joint lacks a
-    value or has one that is not legal; the message names it.
+    """Return what a URDF file says.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is no URDF, or a link or joint lacks a value or has one that is not legal; the message
+        names it.
     """
     path = Path(path)
     refuse_special(path)

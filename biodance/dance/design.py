@@ -40,7 +40,12 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
     People who tire (a gentle plan) or whose arms stay near the body are first asked only for what leaves imprecise
     people `AMPLE` room, others where a course with `ENOUGH` could not be repaired; both where less than a third of the
     plan is left. If none is safe, the longest stretch of it is danced at which nobody comes too near a limit; if there
-    is none, the course as it is. Raises NoNextPosture: there is no course.
+    is none, the course as it is.
+
+    Raises
+    ------
+    NoNextPosture
+        There is no course.
     """
     found, missing = list[tuple[Course[WordStep], PerformersResult]](), list[NoNextPosture]()
     plan = work.plan
@@ -210,8 +215,12 @@ def design(
 
     ``limits`` are kept beside those of the plan, or in place of one of the same name; ``tell`` is told the progress;
     with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers`` run the
-    searches (default: two processes). Raises BiodanceError: there is no such dance; the message names the posture or
-    move and the limit that forbids it.
+    searches (default: two processes).
+
+    Raises
+    ------
+    BiodanceError
+        There is no such dance: the message names the posture or move and the limit that forbids it.
     """
     if workers is None:
         with ProcessPoolExecutor(WORKERS) as pool:

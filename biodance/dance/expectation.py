@@ -281,7 +281,12 @@ def score_performance(
     """Return how well ``dance`` was danced in the motions ``recorded`` of ``body``, each with its usable frames (T,).
 
     `PROPOSED` transitions are chosen one after another, each the one that raises the mean share most beside those
-    chosen before. Raises BiodanceError: the dance has joints that the body has not, or nothing was recorded.
+    chosen before.
+
+    Raises
+    ------
+    BiodanceError
+        The dance has joints that the body has not, or nothing was recorded.
     """
     _same_joints(dance, body)
     if not any(use.any() for _, use in recorded):

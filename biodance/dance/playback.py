@@ -125,7 +125,13 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
     """Return what becomes of ``motion`` of ``body``, from rest with feet on the plane z = 0, by its joints alone.
 
     ``down`` (T, 2) True where the right, the left foot is planned to bear; by default where its sole is near the floor.
-    Raises MissingLibrary: MuJoCo is not installed. BiodanceError: the body has no free root or not two feet.
+
+    Raises
+    ------
+    MissingLibrary
+        MuJoCo is not installed.
+    BiodanceError
+        The body has no free root or not two feet.
     """
     mujoco = _mujoco()
     wrench = predict_wrench(body, motion)
@@ -262,8 +268,14 @@ class Rehearsal:
 
 
 def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehearsal:
-    """Return what becomes of a dance whose postures are held for ``hold`` s only, driven by its joints alone. Raises
-    MissingLibrary: MuJoCo is not installed. BiodanceError: it is danced on a stool, which is not simulated.
+    """Return what becomes of a dance whose postures are held for ``hold`` s only, driven by its joints alone.
+
+    Raises
+    ------
+    MissingLibrary
+        MuJoCo is not installed.
+    BiodanceError
+        It is danced on a stool, which is not simulated.
     """
     if any(stance.seat for stance in dance.stances):
         raise BiodanceError(f"Dance {dance.protocol}: is danced on a stool, which is not simulated. Play another one.")

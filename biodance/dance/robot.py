@@ -76,8 +76,12 @@ _LIGHTEST = 4.0
 
 def robot_plan(body: Body, plan: Plan) -> Plan:
     """Return the plan for the robot ``body`` (in standing frames): its own time for a move, its own distance between
-    the feet. Raises BiodanceError: the plan is one for persons only (on a stool, with hands on a frame), or the robot
-    is too light.
+    the feet.
+
+    Raises
+    ------
+    BiodanceError
+        The plan is one for persons only (on a stool, with hands on a frame), or the robot is too light.
     """
     if plan.seated or plan.holds:
         raise BiodanceError(
@@ -130,8 +134,12 @@ def design_robot(
     resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and
-    what is left of every limit; see `design.design`. Raises BiodanceError: there is no such dance; the message names
-    the posture or move and the limit that forbids it.
+    what is left of every limit; see `design.design`.
+
+    Raises
+    ------
+    BiodanceError
+        There is no such dance: the message names the posture or move and the limit that forbids it.
     """
     plan, to = plan.with_limits(limits), person_sized(body)
     long = person_sized_plan(plan, to)

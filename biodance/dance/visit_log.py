@@ -73,8 +73,12 @@ class VisitLog:
 
 
 def read_visit_logs(folder: Path, dance: Dance) -> tuple[VisitLog, ...]:
-    """Return the logs of a visit's ``folder`` (`PATTERN`), oldest first. Raises FileRefused: a file of that name is no
-    log; the message says what in it is not legal.
+    """Return the logs of a visit's ``folder`` (`PATTERN`), oldest first.
+
+    Raises
+    ------
+    FileRefused
+        A file of that name is no log; the message says what in it is not legal.
     """
     logs = []
     for path in sorted(Path(folder).glob(PATTERN)):

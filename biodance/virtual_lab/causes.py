@@ -247,8 +247,14 @@ _GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "t
 
 def fault_of(cause: Hidden, clock: Clock) -> Fault:
     """Return the change of a recording that a cause makes; ``clock`` says from and to where in the session each trial
-    lies. Raises UnknownName: the cause is not made in the recording, or its target does not exist. BiodanceError: a
-    parameter is missing or has a wrong name.
+    lies.
+
+    Raises
+    ------
+    UnknownName
+        The cause is not made in the recording, or its target does not exist.
+    BiodanceError
+        A parameter is missing or has a wrong name.
     """
     refuse_unknown("effect that is made in a recording", cause.name, FAULTS)
     builder = FAULTS[cause.name]
@@ -341,8 +347,14 @@ CAUSES = (*FAULTS, *FORCES, *IN_THE_PERSON)
 
 
 def conceal(cause: Hidden, scene: Scene) -> Scene:
-    """Return the scene with one more cause in it. Raises UnknownName: there is no such cause, or its target does not
-    exist. BiodanceError: a parameter is missing, has a wrong name or an impossible value.
+    """Return the scene with one more cause in it.
+
+    Raises
+    ------
+    UnknownName
+        There is no such cause, or its target does not exist.
+    BiodanceError
+        A parameter is missing, has a wrong name or an impossible value.
     """
     if cause.name in IN_THE_PERSON:
         return IN_THE_PERSON[cause.name](cause, scene)
@@ -361,8 +373,12 @@ def conceal(cause: Hidden, scene: Scene) -> Scene:
 
 
 def parse_cause(text: str) -> Hidden:
-    """Read ``NAME:target=...,param=value,...``; a value of three numbers is written ``0.05;0;0``. Raises BiodanceError:
-    the text does not have that form; the message shows the part and an example.
+    """Read ``NAME:target=...,param=value,...``; a value of three numbers is written ``0.05;0;0``.
+
+    Raises
+    ------
+    BiodanceError
+        The text does not have that form; the message shows the part and an example.
     """
     name, _, rest = text.partition(":")
     values: dict[str, tuple[float, ...]] = {}
@@ -389,8 +405,14 @@ def parse_cause(text: str) -> Hidden:
 def hide(
     hidden: tuple[Hidden, ...], subject: Subject, protocol: Protocol, *, seed: int, visit: LabVisit = FIRST_VISIT
 ) -> tuple[LabVisit, tuple[AddedLoad, ...]]:
-    """Return the visit with the causes, and the loads that the person carries. Raises UnknownName: a cause, target or
-    channel does not exist. BiodanceError: a parameter is missing, or a mass is not positive.
+    """Return the visit with the causes, and the loads that the person carries.
+
+    Raises
+    ------
+    UnknownName
+        A cause, target or channel does not exist.
+    BiodanceError
+        A parameter is missing, or a mass is not positive.
     """
     scene = Scene(make_person(subject, seed, tolerances=visit.tolerances, session=visit.number), protocol, visit)
     for cause in hidden:

@@ -55,9 +55,14 @@ def simulate_session(
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
     ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``.
-    ``loads`` are carried on top of the subject's mass. The same arguments write the same bytes. Raises BiodanceError:
-    the folder is not empty, or the subject is outside the range that the virtual body covers. UnknownName: there is no
-    such protocol.
+    ``loads`` are carried on top of the subject's mass. The same arguments write the same bytes.
+
+    Raises
+    ------
+    BiodanceError
+        The folder is not empty, or the subject is outside the range that the virtual body covers.
+    UnknownName
+        There is no such protocol.
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
     return write_visit(subject, plan, out, perform_in, seed=seed, loads=loads, visit=visit)
@@ -75,8 +80,12 @@ def write_visit(
     bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its
-    folder; markers were glued on somebody with joints ``bent`` by so many rad. Raises BiodanceError: the folder is not
-    empty, or the subject is outside the range that the virtual body covers.
+    folder; markers were glued on somebody with joints ``bent`` by so many rad.
+
+    Raises
+    ------
+    BiodanceError
+        The folder is not empty, or the subject is outside the range that the virtual body covers.
     """
     check_simulated(subject)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):

@@ -77,8 +77,12 @@ def load_on(person: Person, segment: str, mass: float, *, place: Array | None = 
     """Return a load of ``mass`` kg on one of the 12 segments.
 
     ``place`` (3,) m is its centre in that segment's true joint frame; by default 6 cm outwards of the segment's centre
-    of mass (pelvis and trunk: 10 cm backwards). The forearm carries for forearm_hand, the thorax for trunk_head. Raises
-    UnknownName: ``segment`` is none of the 12.
+    of mass (pelvis and trunk: 10 cm backwards). The forearm carries for forearm_hand, the thorax for trunk_head.
+
+    Raises
+    ------
+    UnknownName
+        ``segment`` is none of the 12.
     """
     refuse_unknown("segment of the 12-segment model", segment, MERGED)
     if place is None:

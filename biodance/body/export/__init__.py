@@ -55,8 +55,12 @@ class Branch:
 
 
 def segment_tree(body: Body) -> tuple[Branch, ...]:
-    """Return the branches of all segments, every one behind that on which it hangs. Raises BiodanceError: a link
-    without segment carries more than one joint: such a tree has no compound joints.
+    """Return the branches of all segments, every one behind that on which it hangs.
+
+    Raises
+    ------
+    BiodanceError
+        A link without segment carries more than one joint: such a tree has no compound joints.
     """
     outwards = sorted(range(len(body.segments)), key=lambda i: body.segment_joint[i])
     branches = tuple(_branch(body, i) for i in outwards)
@@ -182,10 +186,16 @@ def write_model(
 ) -> Path:
     """Write ``body`` as a model file and return the path; ``format`` is the name of one, or an object that writes it.
 
-    ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb). Raises
-    UnknownName: there is no such format. BiodanceError: the inertia of a segment cannot exist, or the format cannot
-    hold the joints or the solids of this body. FileRefused: the file, or one that belongs beside it, exists (nothing is
-    overwritten), or cannot be written.
+    ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb).
+
+    Raises
+    ------
+    UnknownName
+        There is no such format.
+    BiodanceError
+        The inertia of a segment cannot exist, or the format cannot hold the joints or the solids of this body.
+    FileRefused
+        The file, or one that belongs beside it, exists (nothing is overwritten), or cannot be written.
     """
     path = Path(path)
     (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()

@@ -24,8 +24,12 @@ _WORLD_NODE = "world"
 
 
 def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
-    """Return the .glb of ``body``; ``solids`` by segment instead of those in the boxes. Raises BiodanceError: no
-    segment has a solid.
+    """Return the .glb of ``body``; ``solids`` by segment instead of those in the boxes.
+
+    Raises
+    ------
+    BiodanceError
+        No segment has a solid.
     """
     import trimesh
 

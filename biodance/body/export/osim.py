@@ -27,8 +27,12 @@ ROOT_TRANSLATIONS = ("tx", "ty", "tz")
 
 
 def text(body: Body, source: str, solids: SegmentSolids | None = None) -> str:
-    """Return the .osim of ``body``; with ``solids`` it names the meshes that ``beside`` writes. Raises BiodanceError:
-    the axes of one joint do not meet in one point or are more than three: OpenSim's custom joint cannot hold them.
+    """Return the .osim of ``body``; with ``solids`` it names the meshes that ``beside`` writes.
+
+    Raises
+    ------
+    BiodanceError
+        The axes of one joint do not meet in one point or are more than three: OpenSim's custom joint cannot hold them.
     """
     root = Element("OpenSimDocument", Version="40000")
     model = add(root, "Model", name=plain_name(body.name))

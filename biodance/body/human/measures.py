@@ -39,8 +39,13 @@ class StaticPosture:
 
 def standing(static: Trial) -> StaticPosture:
     """Return the posture of a static trial: the median over its quietest half second, or over all frames for a marker
-    not seen then. Raises TrialRefused: there are no markers, no recognised marker set, or a landmark that the body
-    needs is missing in every frame; all are named.
+    not seen then.
+
+    Raises
+    ------
+    TrialRefused
+        There are no markers, no recognised marker set, or a landmark that the body needs is missing in every frame; all
+        are named.
     """
     where = f"Static trial {static.name}"
     if static.markers is None:

@@ -261,8 +261,12 @@ class Opinion:
 
 
 def body_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[Opinion, ...]:
-    """Return what girths, foot outlines and a scan of the subject say, as far as they were given. Raises
-    SessionRefused: one of them cannot be of this person.
+    """Return what girths, foot outlines and a scan of the subject say, as far as they were given.
+
+    Raises
+    ------
+    SessionRefused
+        One of them cannot be of this person.
     """
     opinions = []
     if subject.girths:

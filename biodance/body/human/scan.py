@@ -217,8 +217,12 @@ class _Cut:
 
 
 def cut_scan(scan: _Scan, skeleton: Skeleton) -> ScannedBody:
-    """Return masses, CoM and inertias of the segments of a scanned person. Raises SessionRefused: an arm hangs against
-    the trunk or is bent, so that it cannot be told from it.
+    """Return masses, CoM and inertias of the segments of a scanned person.
+
+    Raises
+    ------
+    SessionRefused
+        An arm hangs against the trunk or is bent, so that it cannot be told from it.
     """
     rest = scan.triangles
     lumps: dict[str, RigidInertia] = {}

@@ -70,7 +70,13 @@ class AnthropometricTable:
         return _rows_where(self, tuple(wanted.items()))
 
     def row(self, **wanted: str) -> TableRow:
-        """Return the one row that matches. Raises UnknownName: no row, or more than one, matches."""
+        """Return the one row that matches.
+
+        Raises
+        ------
+        UnknownName
+            No row, or more than one, matches.
+        """
         rows = self.where(**wanted)
         if len(rows) != 1:
             column, text = next(iter(wanted.items()))
@@ -92,8 +98,14 @@ def row_numbers(row: TableRow, columns: str) -> tuple[float, ...]:
 @functools.cache
 def read_table(family: str, name: str) -> AnthropometricTable:
     """Read ``anthropometry/<family>/<name>.csv`` and its provenance, for example ``read_table("segments",
-    "de_leva_1996")``. Raises UnknownName: there is no such table; the message lists all. BiodanceError: the numbers are
-    not those that the provenance describes (sha256).
+    "de_leva_1996")``.
+
+    Raises
+    ------
+    UnknownName
+        There is no such table; the message lists all.
+    BiodanceError
+        The numbers are not those that the provenance describes (sha256).
     """
     path = locate(f"anthropometry/{family}", name, ".csv")
     provenance = read_toml(path.with_suffix(".toml"))

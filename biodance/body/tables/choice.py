@@ -228,8 +228,13 @@ def _with_mass(lump: RigidInertia, mass: float, scale: float) -> RigidInertia:
 
 def zatsiorsky(subject: Subject) -> Reference:
     """Return the regressions of Zatsiorsky 2002 on mass and stature, men; CoM and lengths from de Leva 1996, whose
-    landmarks are joints. Raises UnknownName: the subject is a woman: the only transcription found of the women's
-    coefficients is wrong (a foot of negative mass, a body of 60.6 kg for 65 kg), so it is not shipped.
+    landmarks are joints.
+
+    Raises
+    ------
+    UnknownName
+        The subject is a woman: the only transcription found of the women's coefficients is wrong (a foot of negative
+        mass, a body of 60.6 kg for 65 kg), so it is not shipped.
     """
     if subject.sex == "F":
         raise UnknownName(
@@ -399,8 +404,14 @@ def trunk_joint(table: str) -> str:
 def reference(table: str, subject: Subject) -> Reference:
     """Return the reference person of one table: ``de_leva_1996``, ``dumas_2018``, ``winter_2009``, ``zatsiorsky_2002``
     (men), a study of segment masses, for example ``pavol_2002`` (older adults) or ``jensen_1986_12y``, or a user's own
-    by its path. Raises UnknownName: no such table for this sex; the message lists the legal ones. FileRefused: a user's
-    own table breaks a rule (`read_segment_table`, `_completed`).
+    by its path.
+
+    Raises
+    ------
+    UnknownName
+        No such table for this sex; the message lists the legal ones.
+    FileRefused
+        A user's own table breaks a rule (`read_segment_table`, `_completed`).
     """
     table = str(table)
     if table in studies(subject.sex):

@@ -15,8 +15,12 @@ def error_rows(*, whose: str = "believed") -> tuple[TableRow, ...]:
 def error_size(quantity: str, target: str, *, state: str = "any") -> float:
     """Return one standard deviation of an error in the unit of the table (SI, per axis).
 
-    ``state`` of a joint: "before" or "after" functional calibration; "any" for what does not depend on it. Raises
-    UnknownName: the table has no such row.
+    ``state`` of a joint: "before" or "after" functional calibration; "any" for what does not depend on it.
+
+    Raises
+    ------
+    UnknownName
+        The table has no such row.
     """
     row = {"quantity": quantity, "target": target, "state": state, "whose": "believed"}
     return float(read_table("uncertainty", "sizes").row(**row)["sd"])

@@ -95,10 +95,15 @@ class SegmentTable:
 def read_segment_table(name_or_path: str | Path) -> SegmentTable:
     """Return a table by its name, or a user's own by the path of its .csv file (then the path is its name).
 
-    A .toml of the same name beside the file gives provenance and ``layout``; a user's own file may do without. Raises
-    UnknownName: there is no table of that name; the message lists all. BiodanceError: the file is missing, is not of
-    this form, or its numbers are not those that its .toml describes (sha256); the message names the row, the value and
-    what would be legal.
+    A .toml of the same name beside the file gives provenance and ``layout``; a user's own file may do without.
+
+    Raises
+    ------
+    UnknownName
+        There is no table of that name; the message lists all.
+    BiodanceError
+        The file is missing, is not of this form, or its numbers are not those that its .toml describes (sha256); the
+        message names the row, the value and what would be legal.
     """
     path = FAMILY.locate(name_or_path)
     own = str(name_or_path).endswith(FAMILY.suffix)

@@ -277,15 +277,23 @@ FAMILY: Family[Limit | type[Limit]] = Family(
 
 
 def family() -> tuple[Limit, ...]:
-    """Return all limits of the folder and of other packages with their usual numbers, by name. Raises BiodanceError: a
-    file of the folder or an entry point is no limit; the sentence says which and what to do.
+    """Return all limits of the folder and of other packages with their usual numbers, by name.
+
+    Raises
+    ------
+    BiodanceError
+        A file of the folder or an entry point is no limit; the sentence says which and what to do.
     """
     return join_limits(FAMILY.members().values(), ())
 
 
 def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:
-    """Return ``limits`` and ``more``, objects or classes, by name; where a name is in both, the one of ``more``. Raises
-    BiodanceError: one of ``more`` is no limit.
+    """Return ``limits`` and ``more``, objects or classes, by name; where a name is in both, the one of ``more``.
+
+    Raises
+    ------
+    BiodanceError
+        One of ``more`` is no limit.
     """
     found: dict[str, Limit] = {}
     for one in (*limits, *more):
@@ -298,9 +306,14 @@ def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | ty
 
 
 def limits_with(numbers: Mapping[str, Mapping[str, float]], *, where: str) -> tuple[Limit, ...]:
-    """Return the family with other ``numbers`` (limit -> field -> value), found ``where``. Raises UnknownName: there is
-    no such limit, or it has no such number; the message lists the legal ones. BiodanceError: a number is outside its
-    legal range.
+    """Return the family with other ``numbers`` (limit -> field -> value), found ``where``.
+
+    Raises
+    ------
+    UnknownName
+        There is no such limit, or it has no such number; the message lists the legal ones.
+    BiodanceError
+        A number is outside its legal range.
     """
     usual = {limit.name: limit for limit in family()}
     for name, given in numbers.items():

@@ -53,8 +53,12 @@ def room_in_words(room: Array, *, seated: bool = False) -> str:
 
 
 def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
-    """Return ``wide`` and ``forward`` of a plan, reduced where its plate asks for it: all feet fit on the plate. Raises
-    BiodanceError: the plate is too small for feet as near to each other as is legal, or for the stool.
+    """Return ``wide`` and ``forward`` of a plan, reduced where its plate asks for it: all feet fit on the plate.
+
+    Raises
+    ------
+    BiodanceError
+        The plate is too small for feet as near to each other as is legal, or for the stool.
     """
     if plan.plate is None:
         return plan.wide, plan.forward
@@ -108,7 +112,12 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     both feet.
 
     Where the person may not stand alone on the left leg nobody steps: all double support is danced on the first pair of
-    feet. Raises BiodanceError: the plan changes between standing and sitting.
+    feet.
+
+    Raises
+    ------
+    BiodanceError
+        The plan changes between standing and sitting.
     """
     names = [name for name, _ in plan.blocks]
     if "seated" in names and len(names) > 1:

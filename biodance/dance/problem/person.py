@@ -76,9 +76,15 @@ HEALTHY = PersonLimits()
 
 def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tuple[str, ...]]:
     """Return the body with the person's limits, the plan with those that are no joint's and without what the person may
-    not do, and what was left out or corrected, in plain sentences. Raises UnknownName: a key names no joint of this
-    body. BiodanceError: a range lies outside the joint's own, or nothing of the protocol is left; the message names the
-    constraint that forbids it.
+    not do, and what was left out or corrected, in plain sentences.
+
+    Raises
+    ------
+    UnknownName
+        A key names no joint of this body.
+    BiodanceError
+        A range lies outside the joint's own, or nothing of the protocol is left; the message names the constraint that
+        forbids it.
     """
     _check_standing(plan, person)
     kept = tuple(block for block in plan.blocks if _allowed(block[0], person))
@@ -332,9 +338,13 @@ def read_person(path: str | Path) -> PersonLimits:
     movement is in plain English ("arm forward") or by its ISB joint ("shoulder flexion"), of one side or of both;
     spaces, dots and underscores are the same. Angles are positive in the direction of the name. What an arm is lifted
     at most holds whatever the joint angles by which (`ArmLift`); where only one direction is named it holds for both.
-    Raises UnknownName: a key, a leg or a movement does not exist. (Joints are looked up later, in the body.).
-    BiodanceError: the file cannot be read, or a value is not legal; the message names file, key, value and what would
-    be legal.
+
+    Raises
+    ------
+    UnknownName
+        A key, a leg or a movement does not exist. (Joints are looked up later, in the body.)
+    BiodanceError
+        The file cannot be read, or a value is not legal; the message names file, key, value and what would be legal.
     """
     return limits_in(read_toml(Path(path)), Path(path))
 

@@ -244,9 +244,14 @@ _KEYS = (*_WORDS, *_NUMBERS, *_SHORT, *_FLAGS)
 
 def read_plan(name_or_path: str | Path) -> Plan:
     """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the
-    user's by the path of its TOML file. Raises UnknownName: no shipped protocol has this name; a key of the file or a
-    stance does not exist. BiodanceError: the file cannot be read, or a value is not legal; the message names file, key,
-    value and what would be legal.
+    user's by the path of its TOML file.
+
+    Raises
+    ------
+    UnknownName
+        No shipped protocol has this name; a key of the file or a stance does not exist.
+    BiodanceError
+        The file cannot be read, or a value is not legal; the message names file, key, value and what would be legal.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":

@@ -37,7 +37,12 @@ class Basis:
 
 def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
     """Return the sampled basis of a rest-to-rest transition with ``via`` points; samples at ``rate`` Hz include both
-    ends. Raises BiodanceError: the duration or the rate is not positive, or there are fewer than two samples.
+    ends.
+
+    Raises
+    ------
+    BiodanceError
+        The duration or the rate is not positive, or there are fewer than two samples.
     """
     if duration <= 0 or rate <= 0 or duration * rate < 1:
         raise BiodanceError(

@@ -91,8 +91,13 @@ Vocabulary = dict[str, tuple[Word, ...]]
 
 
 def read_vocabulary() -> Vocabulary:
-    """Return the words of ``protocols/vocabulary/people.toml``. Raises BiodanceError: a group is missing or unknown, a
-    key is unknown, a group has not one word for rest, or a mirror image is missing.
+    """Return the words of ``protocols/vocabulary/people.toml``.
+
+    Raises
+    ------
+    BiodanceError
+        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image
+        is missing.
     """
     path = locate("protocols/vocabulary", "people")
     raw = read_toml(path)

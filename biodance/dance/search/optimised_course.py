@@ -43,8 +43,13 @@ _FEWER = 4
 
 
 def optimised_course(work: DesignContext) -> Course[PlainStep]:
-    """Return the postures and moves of a dance, all of which keep the limits. Raises BiodanceError: there is no posture
-    on some feet, or a move cannot be made whatever postures it joins; the message names the limit.
+    """Return the postures and moves of a dance, all of which keep the limits.
+
+    Raises
+    ------
+    BiodanceError
+        There is no posture on some feet, or a move cannot be made whatever postures it joins; the message names the
+        limit.
     """
     return feasible_course(work, _postures(work))
 
@@ -153,8 +158,12 @@ def _shortened(path: list[int], apart: Array, before: int | None) -> list[int]:
 
 
 def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[PlainStep]:
-    """Return the course with moves that keep all limits, and in sentences what of its postures had to change. Raises
-    BiodanceError: a move cannot be made whatever postures it joins; the message names it and the limit it breaks.
+    """Return the course with moves that keep all limits, and in sentences what of its postures had to change.
+
+    Raises
+    ------
+    BiodanceError
+        A move cannot be made whatever postures it joins; the message names it and the limit it breaks.
     """
     first, course = course, with_exciting_moves(work, course)
     for attempt in range(1, len(_ENDS) + _FEWER + 1):

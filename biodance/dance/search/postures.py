@@ -101,7 +101,12 @@ def intermediate_posture(
     chain: Chain, stance: Stance, neighbours: Array, limits: tuple[Limit, ...], *, seed: list[int], mild: float = MILD
 ) -> Posture:
     """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles
-    is the aim. Raises BiodanceError: there is none within the limits; the message names the limit.
+    is the aim.
+
+    Raises
+    ------
+    BiodanceError
+        There is none within the limits; the message names the limit.
     """
     rng, tried = np.random.default_rng(seed), list[Array]()
     begin = initial_guess(chain, stance, rng)
@@ -314,8 +319,12 @@ def find_postures(
     workers: Executor,
 ) -> Array:
     """Return the coordinates (P, n) of one posture for each of ``stances`` that keeps the ``limits``, together the most
-    exciting for all first moments. Raises BiodanceError: on some feet there is no posture within the limits; the
-    message names the limit.
+    exciting for all first moments.
+
+    Raises
+    ------
+    BiodanceError
+        On some feet there is no posture within the limits; the message names the limit.
     """
     search = _Search(chain, blocks, stances, limits, seed)
     kept = search.independent_runs(workers)

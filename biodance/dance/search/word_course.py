@@ -265,8 +265,12 @@ class WordSearch:
         self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
 
     def course(self, stances: tuple[Stance, ...]) -> Course[WordStep]:
-        """Return one step for each of ``stances`` and the moves between them. Raises NoNextPosture: from some posture
-        no other one can be reached; the message names the limit that most of them break.
+        """Return one step for each of ``stances`` and the moves between them.
+
+        Raises
+        ------
+        NoNextPosture
+            From some posture no other one can be reached; the message names the limit that most of them break.
         """
         self._check_feet(stances)
         path, farthest = [_Place(self.information.beforehand)], 0
@@ -426,8 +430,12 @@ class WordSearch:
 
 def word_course(search: WordSearch) -> Course[WordStep]:
     """Return the course that a search finds; what this person cannot do of the plan is left out, and this is said:
-    words, feet on which there is no posture, and postures beyond those that follow on each other. Raises NoNextPosture:
-    there are not even two postures on any of the feet.
+    words, feet on which there is no posture, and postures beyond those that follow on each other.
+
+    Raises
+    ------
+    NoNextPosture
+        There are not even two postures on any of the feet.
     """
     body, plan, notes = search.work.chain.body, search.work.plan, list[str]()
     while True:
@@ -451,7 +459,12 @@ def freer_dance(body: Body, plan: Plan, *, seed: int = 0, stances: tuple[Stance,
     """Return the dance of as many postures of the same words on the same feet, chosen freely: no limit on instructions,
     no ``simplicity``; ``stances`` the feet, by default those of the plan. Its postures keep the limits and suit
     imprecise people; its moves go straight and nobody has looked at them, so that it only tells what it costs that a
-    dance can be followed. Raises NoNextPosture: there are not as many different ones.
+    dance can be followed.
+
+    Raises
+    ------
+    NoNextPosture
+        There are not as many different ones.
     """
     free = replace(plan, instructions=np.inf, simplicity=0.0)
     stances = stances or support_sequence(body, free)

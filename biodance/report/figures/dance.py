@@ -149,8 +149,14 @@ _FORMATS = (".gif", ".mp4")
 
 
 def film_path(out: Path, *, force: bool = False) -> Path:
-    """Return the path of a film that can be written. Raises BiodanceError: the name ends otherwise than .gif or .mp4,
-    or the file exists and ``force`` was not given. MissingLibrary: an .mp4 is asked for and ffmpeg is not installed.
+    """Return the path of a film that can be written.
+
+    Raises
+    ------
+    BiodanceError
+        The name ends otherwise than .gif or .mp4, or the file exists and ``force`` was not given.
+    MissingLibrary
+        An .mp4 is asked for and ffmpeg is not installed.
     """
     if out.suffix.lower() not in _FORMATS:
         raise BiodanceError(f"{out}: a film ends in {' or '.join(_FORMATS)}. Choose another --out.")

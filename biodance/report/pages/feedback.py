@@ -222,10 +222,14 @@ def write_feedback(
     """Write the page of a dance to ``path``, in a ``language`` of `read_language`, and return whether it follows the
     person (see `bundle`).
 
-    Of one that imprecise people cannot dance safely only ``despite`` that; the page then says so on top. Raises
-    BiodanceError: the dance is not safe and ``despite`` was not given, the name does not end in .html, there is a file
-    of that name and ``force`` was not given, the folder is missing, the dance is that of a robot without solids, or the
-    drawing library is missing.
+    Of one that imprecise people cannot dance safely only ``despite`` that; the page then says so on top.
+
+    Raises
+    ------
+    BiodanceError
+        The dance is not safe and ``despite`` was not given, the name does not end in .html, there is a file of that
+        name and ``force`` was not given, the folder is missing, the dance is that of a robot without solids, or the
+        drawing library is missing.
     """
     refuse_page(path, force=force)
     unsafe = not_safe(dance)

@@ -71,8 +71,13 @@ class Language:
 
 def read_language(name_or_path: str | Path = ENGLISH) -> Language:
     """Return a language by its name (``en``, ``de``, of an entry point), or a laboratory's own by the path of its .po.
-    Raises UnknownName: there is no such language; the message lists all. FileRefused: the file is no catalogue, says no
-    ``Language``, or does not have every sentence with its placeholders.
+
+    Raises
+    ------
+    UnknownName
+        There is no such language; the message lists all.
+    FileRefused
+        The file is no catalogue, says no ``Language``, or does not have every sentence with its placeholders.
     """
     path = FAMILY.locate(name_or_path)
     found = _catalogue(path)

@@ -305,9 +305,13 @@ class _Problem:
 def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> FoundStride:
     """Return the stride of ``person`` whose ``feet`` take the prescribed forces.
 
-    In walking the forces first learn to aim so that the trunk neither nods nor rolls; then the pelvis turns by what is
-    left. The legs are as long as the height of the centre of mass allows. Raises BiodanceError: the repetition does not
-    settle: no such motion was found for this person.
+    In walking the forces first learn to aim so that the trunk neither nods nor rolls; then the pelvis turns by what
+    is left. The legs are as long as the height of the centre of mass allows.
+
+    Raises
+    ------
+    BiodanceError
+        The repetition does not settle: no such motion was found for this person.
     """
     problem, learns = _Problem(person, gait, feet), gait.flight == 0
     upper, level = problem.upper(), 0.55 * person.subject.stature

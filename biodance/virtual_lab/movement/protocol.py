@@ -144,9 +144,14 @@ STEP_KEYS = ("to", "move", "hold", "cycles", "period")
 
 
 def read_protocol(name_or_path: str | Path) -> Protocol:
-    """Return a shipped protocol by name, or one of the user's by the path of its TOML file. Raises UnknownName: no
-    shipped protocol has this name and no such file exists. BiodanceError: the file contradicts the format; the message
-    names the file, the place, the value and what would be legal.
+    """Return a shipped protocol by name, or one of the user's by the path of its TOML file.
+
+    Raises
+    ------
+    UnknownName
+        No shipped protocol has this name and no such file exists.
+    BiodanceError
+        The file contradicts the format; the message names the file, the place, the value and what would be legal.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":

@@ -286,8 +286,14 @@ a tube."""
 
 
 def with_prostheses(person: Person, lighter: Mapping[str, float]) -> Person:
-    """Return the person with prostheses, each so many kg ``lighter`` than the limb from its first segment on. Raises
-    UnknownName: no prosthesis begins there. BiodanceError: the limb does not weigh as much.
+    """Return the person with prostheses, each so many kg ``lighter`` than the limb from its first segment on.
+
+    Raises
+    ------
+    UnknownName
+        No prosthesis begins there.
+    BiodanceError
+        The limb does not weigh as much.
     """
     sip = person.body.sip
     for segment, less in lighter.items():
