@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hidden_faults import hidden
 
-from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
+from biodance.app.outputs import keep_acceptance, preview_of_acceptance
 from biodance.app.sessions import Archive
 from biodance.errors import BiodanceError
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hidden_faults import hidden
 
-from biodance.app.correction import CORRECTIONS, proposed_correction
+from biodance.app.tasks import CORRECTIONS, proposed_correction
 from biodance.effects import SessionEntry
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from batch_work import count, die_in_s2, stuck
 
-from biodance.app.run import RunState, Worker
-from biodance.app.sessions import Archive
+from biodance.app.sessions import Archive, RunState, Worker
 from biodance.batch.run import Ledger
 from biodance.batch.summary import SESSIONS
 from biodance.errors import BiodanceError

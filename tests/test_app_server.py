@@ -13,8 +13,7 @@ import pytest
 from lab_sessions import two_trials, write_trial
 from starlette.testclient import TestClient
 
-from biodance.app.guard import LARGEST_BODY, POLICY
-from biodance.app.server import serve_window, window_application
+from biodance.app.server import LARGEST_BODY, POLICY, serve_window, window_application
 from biodance.app.sessions import Archive
 from biodance.errors import BiodanceError
 from biodance.library import names

@@ -7,7 +7,7 @@ from shutil import copy
 import pytest
 
 from biodance.app.sessions import Archive, SessionPlace
-from biodance.app.steps import stride_rows
+from biodance.app.tasks import stride_rows
 from biodance.batch.work import process_session
 from biodance.errors import BiodanceError
 from biodance.library import parse_json

@@ -11,7 +11,7 @@ from small_dances import BODY, small_dance
 
 from biodance.dance import design
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
-from biodance.dance.limits._checked import _vector
+from biodance.dance.limits import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
 from biodance.dance.performers import Imprecision, PerformersMargin, PerformersResult, PlannedDance, try_performers
 from biodance.dance.problem.chain import Chain

@@ -15,9 +15,8 @@ from biodance.dance.search.known_postures import IN_PART, posture_phrases
 from biodance.errors import UnknownName
 from biodance.pipeline.dance import DanceResult
 from biodance.report.dance import cards_page
-from biodance.report.pages.dance_words import posture_said
 from biodance.report.pages.feedback import write_feedback
-from biodance.report.pages.language import read_language
+from biodance.report.pages.language import posture_said, read_language
 
 GERMAN = read_language("de")
 

@@ -11,7 +11,14 @@ import pytest
 from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.excitation import (
+    SAMPLE_ERROR,
+    SAMPLE_RATE,
+    PostureInformation,
+    excitation_blocks,
+    learned,
+    update_posterior,
+)
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.plan import Plan
@@ -21,7 +28,6 @@ from biodance.dance.search import course as course_module
 from biodance.dance.search import move as move_module
 from biodance.dance.search import optimised_course
 from biodance.dance.search.course import Checkpoint, Course, DesignContext, PlainStep
-from biodance.dance.search.information import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
 from biodance.dance.search.move import Move, Task
 from biodance.dance.search.optimised_course import affordable, feasible_course, nearest_neighbours
 from biodance.dance.search.postures import KEPT, alike, initial_guess, solve

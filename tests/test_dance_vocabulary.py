@@ -9,10 +9,10 @@ import pytest
 from small_dances import BODY, small_dance
 
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.excitation import CENTRES, rows_of_centres
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import Stance
-from biodance.dance.search.information import CENTRES, rows_of_centres
 from biodance.dance.search.known_postures import PostureTable, Vocabulary, read_vocabulary, words_for
 from biodance.dance.verify import longest_alone
 from biodance.motion.kinematics import poses

@@ -13,8 +13,8 @@ from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.learn import MeasuredWalk, healthy_reference, learn_laboratory
 from biodance.pipeline.movement import SessionMovement
 from biodance.report.pages.movement import movement_section
-from biodance.report.tables.gait import gait_document
 from biodance.report.tables.schema import plain_values
+from biodance.report.tables.session import gait_document
 
 SHAPE = np.sin(np.linspace(0, np.pi, 101))
 

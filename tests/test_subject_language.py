@@ -29,13 +29,12 @@ from biodance.report.pages.subject import subject_page
 REPORT = Path(__file__).parents[1] / "biodance" / "report"
 WRITTEN = (
     (REPORT / "pages" / "subject.py", "python"),
-    (REPORT / "pages" / "subject_movement.py", "python"),
     (REPORT / "templates" / "subject.html.j2", "jinja2"),
 )
 DANCED = (
     (REPORT.parent / "dance" / "cues.py", "python"),
     (REPORT / "dance.py", "python"),
-    (REPORT / "pages" / "dance_words.py", "python"),
+    (REPORT / "pages" / "language.py", "python"),
     (REPORT / "pages" / "feedback.py", "python"),
     *((REPORT / "templates" / f"{name}.html.j2", "jinja2") for name in ("cues", "feedback")),
     *((REPORT / "templates" / f"{name}.js", "javascript") for name in ("feedback", "follow", "visit")),

@@ -17,8 +17,7 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.trial_result import Check
 from biodance.report.pages.language import read_language
-from biodance.report.pages.subject import PLAIN_NAMES, subject_page
-from biodance.report.pages.subject_movement import plain_movement
+from biodance.report.pages.subject import PLAIN_NAMES, plain_movement, subject_page
 from biodance.uncertainty.tolerances import shipped
 
 JARGON = ("segment", "inertia", "interval", "marker", "prior", "posterior", "regress", "diagnos", "wrench", "95 %")

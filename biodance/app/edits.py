@@ -146,12 +146,8 @@ def _read(path: Path) -> str:
 
 
 def changed_text(text: str, changes: Sequence[KeyChange]) -> str:
-    """Return a TOML text with keys set or taken out; all else, comments included, is as before.
-
-    Raises
-    ------
-    FileRefused
-        It is no TOML, or a change is about a key inside what is no table.
+    """Return a TOML text with keys set or taken out; all else, comments included, is as before. FileRefused where it is
+    no TOML, or a change is about a key inside what is no table.
     """
     try:
         document = tomlkit.parse(text)

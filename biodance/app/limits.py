@@ -14,10 +14,8 @@ from biodance.library import folder, names, read_toml
 from biodance.records import SIDES
 
 _TEMPLATES = "protocols/limits"
-_NOBODY = "nobody"
-"""Where the form begins with nothing filled in."""
-_FILE = Path("the form")
-"""By what messages call what was filled in."""
+_NOBODY = "nobody"  # Where the form begins with nothing filled in
+_FILE = Path("the form")  # By what messages call what was filled in
 _CANNOT = {
     "stand": "Stand",
     "stand on right leg": "Stand on the right leg alone",
@@ -110,7 +108,7 @@ def _put(document: tomlkit.TOMLDocument, key: str, value: Any, before: Mapping[s
         made.comment(_COMMENTS[key])
         document.add(key, made)
     entries: Any = document[key]
-    same = {name for name in entries if _is_same(name, entries[name], value)}
+    same = {name for name in entries if value.get(plain(name)) == entries[name]}
     for name in [name for name in entries if name not in same]:
         if plain(name) in value:
             entries[name] = value[plain(name)]
@@ -120,10 +118,6 @@ def _put(document: tomlkit.TOMLDocument, key: str, value: Any, before: Mapping[s
     for name, one in value.items():
         if name not in there:
             entries[name] = one
-
-
-def _is_same(name: str, old: Any, value: Mapping[str, Any]) -> bool:
-    return bool(value.get(plain(name)) == old)
 
 
 def _by_side(raw: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@ Excel and CSV, and the formats of other programs, written by `biodance export` i
 """
 
 import io
+import shutil
 import subprocess
 import tempfile
 import zipfile
@@ -21,10 +22,8 @@ from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
 from biodance.report.files import for_spreadsheets
 
-_LONGEST = 600.0
-"""s that a program started for one download may take."""
-_MOST_ROWS = 20_000
-"""Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)."""
+_LONGEST = 600.0  # s that a program started for one download may take
+_MOST_ROWS = 20_000  # Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)
 _PARTS: Mapping[str, tuple[str, ...]] = {
     "gait": ("movement", "gait"),
     "body": ("body", "replay", "masses", "predicts", "torques", "impact", "load", "danced", "changes", "standing"),
@@ -190,3 +189,44 @@ def run_command(*arguments: str, module: str = "biodance") -> str:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines()
         raise BiodanceError(said[-1] if said else f"biodance {arguments[0]} ended with code {done.returncode}.")
     return done.stdout.decode("utf-8", "replace")
+
+
+def run_task(task: str, *arguments: str) -> Any:
+    """Return what one of `tasks.TASKS` answers, in a process of its own; BiodanceError says why it failed."""
+    return parse_json(run_command(task, *arguments, module="biodance.app.tasks"))
+
+
+def preview_of_acceptance(place: SessionPlace, out: Path) -> dict[str, Any]:
+    """Diagnose a session and write what acceptance would write into a folder beside; return before and after:
+    ``residuals`` as `tasks.residual_rows`; ``written`` files with what they are, ``not_applied`` causes with why. The
+    recordings are not touched; the folder is gone where it fails.
+    """
+    folder = _preview_folder(place, out)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        command = run_command("diagnose", str(place.folder), "--accept", f"--out={folder}", "--force", "--json")
+        accepted = parse_json(command).get("accepted") or {}
+        residuals = run_task("residuals", str(place.folder), str(folder))
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return {"residuals": residuals} | {key: accepted.get(key, []) for key in ("written", "not_applied", "corrections")}
+
+
+def keep_acceptance(place: SessionPlace, out: Path) -> Path:
+    """Give what `preview_of_acceptance` wrote its own place and return it; an earlier one is kept beside it.
+    BiodanceError where there is no preview.
+    """
+    preview, kept = _preview_folder(place, out), out / "accepted" / folder_name(place.name)
+    if not preview.is_dir():
+        raise BiodanceError(f"{place.name}: there is nothing to keep. Look at before and after first.")
+    if kept.exists():
+        names = (kept.with_name(f"{kept.name} {number}") for number in range(2, 10_000))
+        kept = next(path for path in names if not path.exists())
+    preview.rename(kept)
+    return kept
+
+
+def _preview_folder(place: SessionPlace, out: Path) -> Path:
+    return out / "accepted" / f"{folder_name(place.name)} (preview)"

@@ -1,5 +1,11 @@
-"""The window's server: one user, this machine alone, every answer within a time and of a size that is known."""
+"""The window's server: one user, this machine alone, every answer within a time and of a size that is known.
 
+It listens on the loopback only. A page of a stranger in the same browser could still reach it: by a name that it lets
+point to 127.0.0.1 (DNS rebinding: the Host header tells), or by a form or script of its own (CSRF: the cookie is
+SameSite=Strict, and whatever changes something must come from our own Origin).
+"""
+
+import hmac
 import secrets
 import socket
 import webbrowser
@@ -14,21 +20,98 @@ import anyio
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from biodance.app.edits import ChangedElsewhereError
-from biodance.app.guard import LARGEST_BODY, LoopbackGuard
 from biodance.app.sessions import Archive
 from biodance.app.window import Asked, Window
 from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
 from biodance.report.pages.template import three_js
 
-_PATIENCE = 10.0
-"""s that a request's body may take."""
+LARGEST_BODY = 2**20
+"""Bytes of a request: a session.toml has a few thousand."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "frame-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+)
+"""What the window's page may do: nothing but with its own server."""
+_HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": POLICY,
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+_READS = ("GET", "HEAD")
+
+
+class LoopbackGuard:
+    """Lets a request to ``app`` through that carries the ``token`` as a cookie and names this server as its host.
+
+    The address ``/?token=...`` gives the browser the cookie and leads to the page without it.
+    """
+
+    def __init__(self, app: ASGIApp, *, token: str, port: int) -> None:
+        self._app, self._token = app, token
+        self._cookie = f"biodance-{port}"
+        self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or hand on to the application."""
+        if scope["type"] == "lifespan":
+            return await self._app(scope, receive, send)
+        if scope["type"] != "http":
+            return None
+        request = Request(scope)
+        answer = self._refusal(request)
+        if answer is not None:
+            return await answer(scope, receive, _with_headers(send))
+        return await self._app(scope, receive, _with_headers(send))
+
+    def _refusal(self, request: Request) -> Response | None:
+        """Return the answer to a request that is not let through; None for one that is."""
+        if request.headers.get("host", "") not in self._hosts:
+            return PlainTextResponse("This address answers to 127.0.0.1 alone.", 403)
+        if request.method not in _READS and not self._own(request):
+            return PlainTextResponse("Changes are taken from the window's own page alone.", 403)
+        if self._same(request.cookies.get(self._cookie, "")):
+            return None
+        if request.url.path == "/" and self._same(request.query_params.get("token", "")):
+            answer = RedirectResponse("/", 303)
+            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
+            return answer
+        return PlainTextResponse("Open the whole address that biodance app printed, with its token.", 403)
+
+    def _own(self, request: Request) -> bool:
+        """Return whether a write comes from the page of this server, as JSON, which no form can send."""
+        origin = request.headers.get("origin", "")
+        json = request.headers.get("content-type", "").startswith("application/json")
+        return json and origin in [f"http://{host}" for host in self._hosts]
+
+    def _same(self, told: str) -> bool:
+        return hmac.compare_digest(told.encode(), self._token.encode())
+
+
+def _with_headers(send: Send) -> Send:
+    """Return ``send`` that adds what every answer says, where it does not say something else itself."""
+
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in _HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return sending
+
+
+_PATIENCE = 10.0  # s that a request's body may take
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
@@ -50,28 +133,12 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         return Response(known[name], media_type=_KINDS[Path(name).suffix])
 
     reads = (
-        window.listed,
-        window.session,
-        window.state,
-        window.markers,
-        window.forces,
-        window.results,
-        window.strides,
-        window.folders,
-        window.form,
+        *(window.listed, window.session, window.state, window.markers, window.forces, window.results),
+        *(window.strides, window.folders, window.form),
     )
     writes = (
-        window.edit,
-        window.text,
-        window.undo,
-        window.redo,
-        window.run,
-        window.stop,
-        window.correction,
-        window.accept,
-        window.keep,
-        window.open,
-        window.limits,
+        *(window.edit, window.text, window.undo, window.redo, window.run, window.stop),
+        *(window.correction, window.accept, window.keep, window.open, window.limits),
     )
     routes = [
         Route("/", static),
@@ -92,9 +159,7 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
 
 
 def _answered(work: Callable[[Asked], Any]) -> Callable[[Request], Any]:
-    """Return an endpoint that does a ``work`` in a thread and answers with what it returns; with a sentence where that
-    is not possible.
-    """
+    """Return an endpoint that does a ``work`` in a thread and answers what it returns, or with a sentence why not."""
 
     async def endpoint(request: Request) -> Response:
         try:
@@ -132,25 +197,12 @@ def _told(sentence: str, status: int) -> JSONResponse:
 def serve_window(
     folder: Path, out: Path, *, port: int = 0, opened: bool = True, tell: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Serve a window over the sessions of a ``folder``, with results in ``out``, until Ctrl-C.
+    """Serve a window over the sessions of a ``folder`` (an archive, or one session), with results in ``out``, until
+    Ctrl-C.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        An archive, or one session.
-    out : pathlib.Path
-        Of the results, as `run_batch` writes them.
-    port : int
-        Of 127.0.0.1; 0 takes a free one.
-    opened : bool
-        Whether the browser is asked to show it.
-    tell : callable
-        Called with the address, once it answers.
-
-    Raises
-    ------
-    BiodanceError
-        There is no session, the results' folder is taken, or the port.
+    ``port`` of 127.0.0.1, 0 takes a free one; ``opened`` whether the browser is asked to show it; ``tell`` is called
+    with the address, once it answers. BiodanceError where there is no session, or the results' folder or the port is
+    taken.
     """
     archive = Archive(folder, out)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -165,18 +217,10 @@ def serve_window(
     token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
     application = window_application(archive, token=token, port=port)
     address = f"http://127.0.0.1:{port}/?token={token}"
-    server = uvicorn.Server(
-        uvicorn.Config(
-            application,
-            log_config=None,
-            access_log=False,
-            server_header=False,
-            timeout_keep_alive=30,
-            timeout_graceful_shutdown=5,
-            limit_concurrency=64,
-            lifespan="on",
-        )
-    )
+    quiet: dict[str, Any] = {"log_config": None, "access_log": False, "server_header": False}
+    patience: dict[str, Any] = {"timeout_keep_alive": 30, "timeout_graceful_shutdown": 5}
+    config = uvicorn.Config(application, limit_concurrency=64, lifespan="on", **quiet, **patience)
+    server = uvicorn.Server(config)
     listener.listen()
     prepare_workers()
     tell(address)

@@ -9,23 +9,21 @@ from typing import Any
 
 from starlette.responses import Response
 
-from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
-from biodance.app.folders import allowed_folder, folders_document
 from biodance.app.limits import limits_form, limits_text
 from biodance.app.outputs import (
     csv_archive,
     exported,
+    keep_acceptance,
     page_part,
+    preview_of_acceptance,
     read_results,
     results_file,
-    run_command,
+    run_task,
     shown_results,
     workbook,
 )
-from biodance.app.recording import forces_document, markers_document
-from biodance.app.run import Worker
-from biodance.app.sessions import Archive, SessionPlace, results_beside
-from biodance.app.view import SessionView
+from biodance.app.sessions import Archive, SessionPlace, Worker, allowed_folder, folders_document, results_beside
+from biodance.app.view import SessionView, forces_document, markers_document
 from biodance.errors import BiodanceError
 from biodance.library import parse_json
 from biodance.records import Trial
@@ -130,7 +128,7 @@ class Window:
         read_results(place)
         about = (str(place.results), str(place.folder), trial.name, trial.source.path.stem)
         with self._one_export:
-            return {"rows": parse_json(run_command(*about, module="biodance.app.steps"))}
+            return {"rows": run_task("strides", *about)}
 
     def run(self, asked: Asked) -> dict[str, Any]:
         """Begin a run over sessions."""
@@ -176,9 +174,7 @@ class Window:
         keys = ("target", "trials", "parameters", "session_entry")
         asked_of = [{key: able[name][key] for key in keys} for name in wanted]
         with self._one_export:
-            return dict(
-                parse_json(run_command(str(place.folder), json.dumps(asked_of), module="biodance.app.correction"))
-            )
+            return dict(run_task("correction", str(place.folder), json.dumps(asked_of)))
 
     def form(self, _: Asked) -> dict[str, Any]:
         """Return what the form for a person's limits asks."""

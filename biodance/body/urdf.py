@@ -218,7 +218,11 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
             "have x forwards and y or z up, and the robot must stand upright at zero angles."
         )
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
-    if _backwards(feet, place, np.cross(ahead, up)):
+    # the root's x axis points backwards (iCub) where along it the foot that is named right is on the left
+    crossed = float((place["right"][1] - place["left"][1]) @ np.cross(ahead, up)) < 0
+    one, other = (feet[side].link.lower() for side in SIDES)
+    pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
+    if crossed and any(this in one and one.replace(this, that) == other for this, that in pairs):
         ahead = -ahead
     sideways = np.cross(ahead, up)
     soles = _soles(file, feet, place, np.stack([ahead, up, sideways]))
@@ -231,14 +235,6 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     standing = replace(body, feet={side: Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
     turn = np.stack([ahead, up, sideways], axis=1)
     return standing if np.array_equal(turn, np.eye(3)) else reframed(standing, 0, turn, np.zeros(3))
-
-
-def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], sideways: Array) -> bool:
-    """Whether the root's x axis points backwards (iCub): along it the foot that is named right is on the left."""
-    crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
-    right, left = (feet[side].link.lower() for side in SIDES)
-    pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
-    return crossed and any(one in right and right.replace(one, other) == left for one, other in pairs)
 
 
 def _soles(

@@ -35,15 +35,20 @@ if TYPE_CHECKING:
     from biodance.records import Subject
 
 FileOut = Annotated[Path, Parameter(help="Output file, e.g. dance.html.")]
-DespiteOption = Annotated[
-    bool,
-    Parameter(help="Write cards or page of a dance that is NOT SAFE when imprecise all the same; they say so."),
-]
 
 
-LanguageOption = Annotated[
-    str, Parameter(help="Language of cards and page: en, de, or the path of a catalogue of your own (*.po).")
-]
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class LeadingOptions:
+    """What leads a person through a dance, and whether at all."""
+
+    despite: Annotated[
+        bool,
+        Parameter(help="Write cards or page of a dance that is NOT SAFE when imprecise all the same; they say so."),
+    ] = False
+    language: Annotated[
+        str, Parameter(help="Language of cards and page: en, de, or the path of a catalogue of your own (*.po).")
+    ] = "en"
 
 
 @Parameter(name="*")
@@ -71,7 +76,7 @@ class DanceAsked:
         return plan if self.plate is None else replace(plan, plate=_sides(self.plate))
 
 
-USUAL_DANCE = DanceAsked()
+USUAL_DANCE, USUAL_LEADING = DanceAsked(), LeadingOptions()
 
 
 @app.command(name="dance")
@@ -86,8 +91,7 @@ def dance_command(
             converter=whole, validator=not_negative, help="Random seed, 0 or more; the same seed gives the same dance."
         ),
     ] = 0,
-    despite: DespiteOption = False,
-    language: LanguageOption = "en",
+    leading: LeadingOptions = USUAL_LEADING,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -107,7 +111,7 @@ def dance_command(
 
     if robot.given and asked.plate is not None:
         raise BiodanceError("--plate is for people: a robot's feet stand as far apart as its hips. Leave it out.")
-    read_language(language)  # what is wrong with it is said before the long work starts
+    read_language(leading.language)  # what is wrong with it is said before the long work starts
     plan, able = asked.plan(), read_person(asked.limits) if asked.limits else HEALTHY
     who = _who(person, robot)
     if isinstance(who, RobotFile):
@@ -124,9 +128,9 @@ def dance_command(
             return STOPPED
         tell("writing", 0, 0)
         with whole_folder(folder, over=True) as part:
-            found = write_dance(result, part, despite=despite, language=language)
+            found = write_dance(result, part, despite=leading.despite, language=leading.language)
     show(found, print_dance, json=json, path=folder)
-    if result.dance is not None and result.dance.unsafe and not despite:
+    if result.dance is not None and result.dance.unsafe and not leading.despite:
         say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
@@ -159,8 +163,7 @@ def limits_command(
 def feedback_command(
     dance: Path,
     *,
-    despite: DespiteOption = False,
-    language: LanguageOption = "en",
+    leading: LeadingOptions = USUAL_LEADING,
     out: FileOut,
     force: ForceOption = False,
 ) -> int:
@@ -179,7 +182,8 @@ def feedback_command(
     from biodance.dance.dance import Dance
     from biodance.report.pages.feedback import write_feedback
 
-    if not write_feedback(Dance.load(dance), out, force=force, despite=despite, language=language):
+    one = Dance.load(dance)
+    if not write_feedback(one, out, force=force, despite=leading.despite, language=leading.language):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     show_place(out)
     return DONE

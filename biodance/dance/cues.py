@@ -17,29 +17,21 @@ from biodance.dance.problem.stance import Stance
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
-_SMALLEST = 12.0
-"""degrees: a smaller change is not called."""
-_HANGING = float(np.radians(80.0))
-"""rad that knees are bent of somebody who has sat down."""
-_STEP = 15.0
-"""degrees to which angles are rounded."""
-_MOST = 4
-"""Things that a person can begin at once."""
-_ALIKE = 12.0
-"""degrees within which right and left are called as a pair."""
-_FORWARD = np.array([1.0, 1.0, -1.0])
-"""Signs of turn, drop and tilt as they are called."""
-_BENT = 30.0
-"""degrees by which the hips lean of themselves when knees that stand bend."""
+_SMALLEST = 12.0  # degrees: a smaller change is not called
+_HANGING = float(np.radians(80.0))  # rad that knees are bent of somebody who has sat down
+_STEP = 15.0  # degrees to which angles are rounded
+_MOST = 4  # Things that a person can begin at once
+_ALIKE = 12.0  # degrees within which right and left are called as a pair
+_FORWARD = np.array([1.0, 1.0, -1.0])  # Signs of turn, drop and tilt as they are called
+_BENT = 30.0  # degrees by which the hips lean of themselves when knees that stand bend
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
 """Beginnings of the names of the joints of the right and of the left arm."""
-_LIFTED = ("shoulder_flexion", "shoulder_adduction")
-"""Movements whose right angle is shoulder height."""
+_LIFTED = ("shoulder_flexion", "shoulder_adduction")  # Movements whose right angle is shoulder height
 REST = "Then rest: let the arms down. Take up this posture again when you are ready."
 """What is called where the person rests (`rests`)."""
-PLURAL = {"foot": "feet"}
+_PLURAL = {"foot": "feet"}
 MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
 
@@ -76,12 +68,12 @@ def cue_sheet(
     words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
     they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests.
     """
-    move, hold = tempo
+    (move, hold), names_of = tempo, ("one", "two", "three", "four", "five", "six", "seven", "eight")
+    counts = " and ".join(names_of[: max(1, min(len(names_of), round(move)))])
     lines = [
         "# The dance, posture by posture",
         "",
-        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of holding still. Only "
-        f"what moves",
+        f"Each posture: {move:g} s to get there, counted *{counts}*, then {hold:g} s of holding still. Only what moves",
         "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture "
         "can be repeated.",
         *(line for sentence in about for line in ("", sentence)),
@@ -120,7 +112,7 @@ def calls(
     changes = {
         joint.name: (float(b), float(a))
         for joint, b, a in zip(body.joints, before, after, strict=True)
-        if abs(a - b) >= _SMALLEST and _is_called(joint.name, planted)
+        if abs(a - b) >= _SMALLEST and not _follows(joint.name, planted)
     }
     whole_body = _words("hips")
     least = dict.fromkeys(whole_body, _SMALLEST)
@@ -137,7 +129,11 @@ def calls(
         if whole != name and whole in changes and _together((start, end), changes[whole]):
             also = changes.pop(whole)
             size = max(abs(one[1] - one[0]) for one in ((start, end), also))
-            found.append((size, _with_hips(_call(name, "", start, end, say), end, also[1], say)))
+            trunk, hips_at = _call(name, "", start, end, say), _rounded(also[1])
+            if _rounded(end) == hips_at:
+                found.append((size, say("%(move)s, hips too", move=trunk)))
+            else:  # the hips go, too, but not as far
+                found.append((size, say("%(move)s, hips too, by about %(angle)s°", move=trunk, angle=f"{hips_at:.0f}")))
             continue
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
@@ -153,13 +149,6 @@ def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
     """Return whether trunk and hips go the same way, from angle to angle (degrees), both somewhere or both back."""
     same = (trunk[1] - trunk[0]) * (hips[1] - hips[0]) > 0
     return same and (_rounded(trunk[1]) == 0) == (_rounded(hips[1]) == 0)
-
-
-def _with_hips(trunk_call: str, trunk: float, hips: float, say: Say) -> str:
-    """Return the call of a trunk with which the hips go, too, and how far (degrees) where it is not as far."""
-    if _rounded(trunk) == _rounded(hips):
-        return say("%(move)s, hips too", move=trunk_call)
-    return say("%(move)s, hips too, by about %(angle)s°", move=trunk_call, angle=f"{_rounded(hips):.0f}")
 
 
 def instructions(
@@ -181,14 +170,7 @@ def instructions(
         arm = [j for j, joint in enumerate(body.joints) if joint.name.startswith(_ARMS[side])]
         before[arm] = after[arm]
     moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]), say)
-    return (*(say(one) for one in (*_grip_calls(was, now), *_feet_calls(was, now))), *moved)
-
-
-def _grip_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
-    """Return what the hands take hold of at the start."""
-    if was is not None or not now.holding:
-        return ()
-    return (f"hold the frame with {'both hands' if len(now.holding) == 2 else f'the {SIDES[now.holding[0]]} hand'}",)
+    return (*map(say, _feet_calls(was, now)), *moved)
 
 
 def dance_instructions(dance: Dance, say: Say = in_english) -> tuple[tuple[str, ...], ...]:
@@ -211,9 +193,12 @@ def skipping(dance: Dance, p: int, before: int, say: Say = in_english) -> tuple[
 
 
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
-    """Return what the feet do between two stances; a leg that is lifted is told by its joints."""
+    """Return what the feet do between two stances (a leg that is lifted is told by its joints), or what the hands take
+    hold of at the start.
+    """
     if was is None:
-        return ()
+        hands = "both hands" if len(now.holding) == 2 else "".join(f"the {SIDES[side]} hand" for side in now.holding)
+        return (f"hold the frame with {hands}",) if hands else ()
     if not np.array_equal(was.ankle, now.ankle):
         ahead = now.ankle[0, 0] > was.ankle[0, 0] + 1e-6
         return ("step forward with the right foot" if ahead else "set the right foot back beside the left one",)
@@ -231,9 +216,10 @@ def _split(name: str) -> tuple[str, str]:
     return (side, name.removeprefix(f"{side}_")) if side in SIDES else ("", name)
 
 
-def _is_called(name: str, planted: tuple[str, ...]) -> bool:
+def _follows(name: str, planted: tuple[str, ...]) -> bool:
+    """Return whether a joint is not called: it has no words, or follows from a foot that stands."""
     side, movement = _split(name)
-    return movement in _words("joints") and not (side in planted and _is_leg(movement) and movement not in PLANTED)
+    return movement not in _words("joints") or (side in planted and _is_leg(movement) and movement not in PLANTED)
 
 
 def _is_leg(movement: str) -> bool:
@@ -242,7 +228,8 @@ def _is_leg(movement: str) -> bool:
 
 def _call(movement: str, side: str, start: float, angle: float, say: Say) -> str:
     part, positive, negative, none = (_words("joints") | _words("hips"))[movement]
-    whole = say(limbs_called(part, side)) if part else ""
+    limbs = f"both {_PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
+    whole = say(limbs) if part else ""
     rounded = _rounded(angle)
     back = say(none).format(whole)
     if rounded == 0:
@@ -257,11 +244,6 @@ def _call(movement: str, side: str, start: float, angle: float, say: Say) -> str
     return say("%(move)s %(size)s", move=say(positive if angle > 0 else negative).format(whole), size=size)
 
 
-def limbs_called(part: str, side: str) -> str:
-    """Return how a ``part`` of one ``side``, or of "both", is called."""
-    return f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
-
-
 def _rounded(angle: float) -> float:
     return _STEP * round(abs(angle) / _STEP)
 
@@ -272,8 +254,3 @@ def _sentence(said: tuple[str, ...]) -> str:
         return "Stay as you are."
     first, rest = "; ".join(said[:_MOST]), "; ".join(said[_MOST:])
     return f"{first[:1].upper()}{first[1:]}." + (f" And also: {rest}." if rest else "")
-
-
-def _counts(seconds: float) -> str:
-    names = ("one", "two", "three", "four", "five", "six", "seven", "eight")
-    return " and ".join(names[: max(1, min(len(names), round(seconds)))])

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from biodance import display
 from biodance.body.body import Body, body_text, parse_body
-from biodance.dance.limits._checked import Margin
+from biodance.dance.limits import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import Phase, path_in, phase_at
 from biodance.dance.problem.stance import Stance, stance_fields
@@ -34,11 +34,9 @@ LARGEST = 2**26
 """Bytes of a dance.npz, unpacked: a thousand times a dance of forty postures."""
 MOST_POSTURES, LONGEST = 1000, 3600.0
 """Postures of a dance, and s that it lasts: what nobody performs."""
-_FAR = 10.0
-"""m: nothing of a dance is farther from the lab origin."""
+_FAR = 10.0  # m: nothing of a dance is farther from the lab origin
 Metres = Annotated[float, Field(ge=-_FAR, le=_FAR, allow_inf_nan=False)]
-_Grip = Annotated[float, Field(allow_inf_nan=True)]
-"""m, NaN = a free hand."""
+_Grip = Annotated[float, Field(allow_inf_nan=True)]  # m, NaN = a free hand
 _Foot = Annotated[int, Field(ge=0, le=1)]
 
 
@@ -98,25 +96,11 @@ class DanceWords(_Entry):
     under: list[StanceWords] = Field(max_length=MOST_POSTURES)
 
 
-def read_words(text: str) -> dict[str, Any]:
-    """Return the words of a dance as `Dance` takes them.
-
-    Raises
-    ------
-    ValueError
-        They are no JSON, or something in them is out of its range: says which, its value and what is legal.
-    """
-    return DanceWords.model_validate(parse_json(text)).model_dump(exclude_unset=True)
+_ARRAYS = ("postures", "hold", "via", "move")
 
 
 def possible_array(name: str, array: Array) -> Array:
-    """Return one of the arrays of a dance.
-
-    Raises
-    ------
-    ValueError
-        It is too long, or holds what is no number or no duration.
-    """
+    """Return one of the `_ARRAYS` of a dance; ValueError where it is too long, or holds no numbers or no durations."""
     if array.ndim < 1 or len(array) > MOST_POSTURES or array.dtype != np.float64:
         raise ValueError(f"{name}: {array.shape} of {array.dtype}; legal are up to {MOST_POSTURES} rows of float64")
     if not np.isfinite(array).all():
@@ -350,7 +334,7 @@ class Dance(Sendable):
         words |= {"care": self.care, "rest": self.rest}
         words["unsafe"] = [asdict(margin) for margin in self.unsafe]
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
-        arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {"words": json.dumps(words), "body": body_text(self.body, self.protocol)}
         with whole_file(Path(path), over=True) as part, part.open("wb") as stream:
             np.savez_compressed(stream, allow_pickle=False, **arrays)
@@ -384,10 +368,9 @@ class Dance(Sendable):
         try:
             refuse_large(path, LARGEST)
             with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as found:
-                words = read_words(str(found["words"]))
-                arrays: dict[str, Any] = {
-                    name: possible_array(name, found[name]) for name in ("postures", "hold", "via", "move")
-                }
+                text = parse_json(str(found["words"]))
+                words = DanceWords.model_validate(text).model_dump(exclude_unset=True)
+                arrays: dict[str, Any] = {name: possible_array(name, found[name]) for name in _ARRAYS}
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
             who = Subject(**words["subject"]) if words.get("subject") else None

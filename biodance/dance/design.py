@@ -25,18 +25,13 @@ from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
-_ROUNDS = 6
-"""Times that all performers dance the whole dance at most."""
-_OTHERS = 6
-"""Postures that are tried in the place of one."""
-_FEW = 40
-"""Performers of a first look."""
+_ROUNDS = 6  # Times that all performers dance the whole dance at most
+_OTHERS = 6  # Postures that are tried in the place of one
+_FEW = 40  # Performers of a first look
 
-_MUCH = 1 / 3
-"""Share of the plan's postures with which nothing longer is looked for."""
+_MUCH = 1 / 3  # Share of the plan's postures with which nothing longer is looked for
 
-_Other = tuple[Course[WordStep], tuple[int, ...]]
-"""A course, and the postures where it differs."""
+_Other = tuple[Course[WordStep], tuple[int, ...]]  # A course, and the postures where it differs
 
 
 def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:
@@ -236,7 +231,10 @@ def design(
     work = replace(alone, checkpoint=checkpoint, workers=workers, tell=tell or alone.tell)
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
-        dance, danced = _followable(work)
+        course, found = safe_course(work)
+        dance = course.dance(work)
+        danced = found.margins(dance)
+        dance = replace(dance, unsafe=broken(danced))
     else:
         dance = optimised_course(work).dance(work)
     work.tell("checking every limit", 0, 0)
@@ -250,11 +248,3 @@ def design(
             f"protocol."
         )
     return dance, margins
-
-
-def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
-    """Return a dance that people can follow, and what imprecise performers leave."""
-    course, found = safe_course(work)
-    dance = course.dance(work)
-    margins = found.margins(dance)
-    return replace(dance, unsafe=broken(margins)), margins

@@ -165,14 +165,12 @@ def _danced() -> dict[str, Any]:
     return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
-_FELT = 1.0
-"""s: a hold that is judged alone says nothing more after this time."""
+_FELT = 1.0  # s: a hold that is judged alone says nothing more after this time
 _TRUST = 0.1
 """Share of the information that disturbances leave where postures and moves are judged one by one: with it whole dances
 tell of every segment what is expected of them.
 """
-_AT_REST = slice(2, 5)
-"""Components of a wrench (Fx, Fy, Fz, Mx, My, Mz) that a body at rest has."""
+_AT_REST = slice(2, 5)  # Components of a wrench (Fx, Fy, Fz, Mx, My, Mz) that a body at rest has
 
 
 @dataclass(frozen=True, eq=False)

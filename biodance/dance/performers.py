@@ -18,28 +18,21 @@ from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
 from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit
 from biodance.dance.problem.chain import ROOT
-from biodance.dance.problem.splines import Phase, path_in, phase_at
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.splines import path_in, phase_at
 from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
 
-_RATE, _PLAN_RATE = 5.0, 25.0
-"""Hz at which performances are judged, and the plan is laid out."""
-_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5
-"""Hz: how fast errors, tempo and sway change."""
+_RATE, _PLAN_RATE = 5.0, 25.0  # Hz at which performances are judged, and the plan is laid out
+_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5  # Hz: how fast errors, tempo and sway change
 _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
-_PENDULUM = 0.1
-"""s²: height of the centre of mass over gravity."""
-_LIFT = 1.0
-"""Share of a move in which a foot leaves the ground, or comes back."""
+_PENDULUM = 0.1  # s²: height of the centre of mass over gravity
+_LIFT = 1.0  # Share of a move in which a foot leaves the ground, or comes back
 _FELT = 3.0
 """s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
-_ROUNDS = 2
-"""Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
-_CARRIED = 0.85
-"""m that the centre of mass goes when the pelvis goes 1 m over planted feet."""
+_ROUNDS = 2  # Corrections of the pelvis; what is left is a tenth of a millimetre a degree
+_CARRIED = 0.85  # m that the centre of mass goes when the pelvis goes 1 m over planted feet
 
 
 @dataclass(frozen=True)
@@ -106,15 +99,23 @@ class PlannedDance:
         before = [dance.stances[max(0, phase.posture - (phase.kind == "move"))] for phase in phases]
         after = [dance.stances[phase.posture] for phase in phases]
         self.down = np.array(
-            [[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after, strict=True)]
+            [
+                [[side in stance.planted for side in (0, 1)] for stance in row]
+                for row in zip(before, self.stances, after, strict=True)
+            ]
         )
         self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
         self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
         first, last = between[0] - _FELT, between[1] + _FELT
         near = [phase for phase in phases if phase.end >= first and phase.start <= last]
-        time = np.unique(np.concatenate([_instants(phase) for phase in near]))
-        rows = self.phase_at(time)
-        x = self._coordinates(rows, time)
+        counts = [max(2, round((phase.end - phase.start) * _PLAN_RATE)) for phase in near]
+        spread = [np.linspace(p.start, p.end, n, endpoint=False) for p, n in zip(near, counts, strict=True)]
+        time: Array = np.unique(np.round(np.concatenate(spread), 9))
+        rows, parts = self.phase_at(time), list[Array]()
+        for p in np.unique(rows):
+            x = path_in(phases[p], dance.postures, dance.via, time[rows == p])[0]
+            parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))  # they hold their feet
+        x = np.concatenate(parts)
         up, ankle = self._feet(rows, time)
         over = x[:, 2] - self._tops(x, up, ankle)
         self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
@@ -122,14 +123,6 @@ class PlannedDance:
     def phase_at(self, when: Array) -> NDArray[np.intp]:
         """Return the phase (T,) at instants of the plan."""
         return phase_at(self.dance.phases, when)
-
-    def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
-        """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
-        dance, parts = self.dance, list[Array]()
-        for p in np.unique(rows):
-            x = path_in(dance.phases[p], dance.postures, dance.via, when[rows == p])[0]
-            parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))
-        return np.concatenate(parts)
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
@@ -208,30 +201,18 @@ class PlannedDance:
         return out
 
 
-def _planted(stance: Stance) -> list[bool]:
-    return [side in stance.planted for side in (0, 1)]
-
-
 def _eased(way: Array) -> Array:
     s = np.clip(way, 0.0, 1.0)
     return s**3 * (10 - 15 * s + 6 * s**2)
-
-
-def _instants(phase: Phase) -> Array:
-    count = max(2, round((phase.end - phase.start) * _PLAN_RATE))
-    return np.round(np.linspace(phase.start, phase.end, count, endpoint=False), 9)
 
 
 OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
-_DRAWN = 96
-"""Imprecise copies of an instant that are looked at."""
-_TOGETHER = 1000
-"""Frames of performers that are looked at together."""
-_STILL = 1e-4
-"""Least deviation, in the limit's unit."""
+_DRAWN = 96  # Imprecise copies of an instant that are looked at
+_TOGETHER = 1000  # Frames of performers that are looked at together
+_STILL = 1e-4  # Least deviation, in the limit's unit
 
 
 @dataclass(frozen=True)

@@ -147,7 +147,8 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
     for frame in range(motion.time.size):
         if frame:
             _advance(mujoco, driver, data, motion, torque, frame)
-        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), driver.place_of(data)))
+        q = np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[driver.q_place]])  # Pinocchio's order
+        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), q))
         for part in driver.touching(data):
             touched.setdefault(part, float(motion.time[frame]))
         if data.qpos[2] < FALLEN * motion.q[frame, 2]:
@@ -191,10 +192,6 @@ class _Driver:
         data.qvel[3:6] = v[3:6]
         data.qpos[self.q_place], data.qvel[self.v_place] = q[7:], v[6:]
 
-    def place_of(self, data: Any) -> Array:
-        """Return the configuration (nq,) in Pinocchio's order."""
-        return np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[self.q_place]])
-
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
         """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""
         spring = self.stiffness * (angle - data.qpos[self.q_place])
@@ -224,8 +221,7 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
     return total
 
 
-_RATE = 100.0
-"""Hz at which plan and playback are compared."""
+_RATE = 100.0  # Hz at which plan and playback are compared
 UNSURE = 0.2
 """s around the instant at which a foot leaves the ground, or comes back, in which it may still, or already, bear: it
 rises by 10 h (t/T)³ at first, so that what sinks by 1 mm bears 0.2 s longer where h = 0.1 m in T = 2 s."""

@@ -6,7 +6,7 @@ dance is designed, and shrunk again: the same angles, slower or faster. Nothing 
 is checked on the robot as it is.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +25,7 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.search.course import Tell
 from biodance.dance.search.move import Task, exciting_move
 from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
@@ -32,37 +33,25 @@ from biodance.errors import BiodanceError
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, empty, layout_for, statistics
 from biodance.motion.dynamics import predict_wrench
-from biodance.records import Array
 from biodance.uncertainty.noise import Noise
 
-_WHERE = 4
-"""Beside the seed: what is searched for at random here."""
-
-
-def rest_posture(dance: Dance, plan: Plan) -> Array:
-    """Return the coordinates (n,) of a posture at rest on the feet of the first posture.
-
-    Raises
-    ------
-    BiodanceError
-        There is none within the limits.
-    """
-    chain, stance = dance.chain, replace(dance.stances[0], over=None)
-    zeros = np.zeros((1, chain.size))
-    return intermediate_posture(chain, stance, zeros, plan.limits, seed=[dance.seed, _WHERE], mild=1.0).x
+_WHERE = 4  # Beside the seed: what is searched for at random here
 
 
 def reposition(dance: Dance, plan: Plan) -> Dance:
     """Return the dance with the move from rest in front; where there is none, the dance with a note that says so."""
+    feet, upright, seed = replace(dance.stances[0], over=None), np.zeros((1, dance.chain.size)), [dance.seed, _WHERE]
     try:
-        rest = rest_posture(dance, plan)
-        ends, feet = np.array([rest, dance.postures[0]]), replace(dance.stances[0], over=None)
+        rest = intermediate_posture(dance.chain, feet, upright, plan.limits, seed=seed, mild=1.0).x
+        ends = np.array([rest, dance.postures[0]])
         task = Task(dance.chain, excitation_blocks(dance.body), feet, ends, plan.move, plan.limits)
-        move = exciting_move(task, np.zeros((len(dance.body.segments), 6, 6)), [dance.seed, _WHERE])
-    except BiodanceError as why:
-        return _without(dance, str(why))
-    if move.limit:
-        return _without(dance, f"the limit {move.limit.replace('_', ' ')} forbids it")
+        move = exciting_move(task, np.zeros((len(dance.body.segments), 6, 6)), seed)
+        why = f"the limit {move.limit.replace('_', ' ')} forbids it" if move.limit else ""
+    except BiodanceError as error:
+        why = str(error)
+    if why:
+        words = f"The robot must be put into its first posture by hand: there is no way from rest ({why})."
+        return replace(dance, notes=(*dance.notes, words))
     more = 1 + len(move.stops)
     return replace(
         dance,
@@ -75,11 +64,6 @@ def reposition(dance: Dance, plan: Plan) -> Dance:
     )
 
 
-def _without(dance: Dance, why: str) -> Dance:
-    words = f"The robot must be put into its first posture by hand: there is no way from rest ({why})."
-    return replace(dance, notes=(*dance.notes, words))
-
-
 _LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
 _FORWARD = 2.0
@@ -88,7 +72,6 @@ UNHURRIED = 2.5
 """rad/s: a robot of slower joints (median) takes longer, in proportion: 5 s, not 2 s, at 1 rad/s (paper, Fig. 11)."""
 _LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
-_Tell = Callable[[str, int, int], None]
 
 
 def robot_plan(body: Body, plan: Plan) -> Plan:
@@ -147,7 +130,7 @@ def design_robot(
     *,
     limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
-    tell: _Tell | None = None,
+    tell: Tell | None = None,
     resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and
@@ -190,10 +173,8 @@ def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
 
 ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
 """N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
-_RATE = 4.0
-"""Hz: independent samples of the wrench."""
-_STEPS = 10
-"""Durations of a dance after which what is expected is told."""
+_RATE = 4.0  # Hz: independent samples of the wrench
+_STEPS = 10  # Durations of a dance after which what is expected is told
 
 
 def expect_robot(dance: Dance) -> Expectation:

@@ -13,7 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit
-from biodance.dance.limits._checked import Margin as Margin
+from biodance.dance.limits import Margin as Margin
 from biodance.dance.problem.excitation import (
     condition,
     dynamic_grams,
@@ -34,8 +34,7 @@ JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
 
-_RATE = 100.0
-"""Hz at which a dance is judged."""
+_RATE = 100.0  # Hz at which a dance is judged
 
 
 @one_thread()
@@ -102,8 +101,7 @@ def _continuity(dance: Dance) -> Margin:
     return Margin("continuity", worst, where, "rad")
 
 
-_PAPER_RATE = 50.0
-"""Hz, of the paper's transitions."""
+_PAPER_RATE = 50.0  # Hz, of the paper's transitions
 _LITTLE = 0.01
 """rad²/s³: information on every inertia supposed before the first move, so that condition numbers are finite."""
 POOR = 30.0

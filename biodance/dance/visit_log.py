@@ -15,8 +15,7 @@ from biodance.library import parse_json, refuse_large, refuse_special
 
 PATTERN = "dance_log*.json"
 """Names of logs beside the recordings of a visit."""
-_LARGEST = 2**22
-"""Bytes of a log: a hundred times one of forty postures."""
+_LARGEST = 2**22  # Bytes of a log: a hundred times one of forty postures
 _Percent = Annotated[float, Field(ge=0, le=100)]
 _Degrees = Annotated[float, Field(ge=-360, le=360)]
 

@@ -25,8 +25,7 @@ from biodance.report.figures.dance import criterion_figure, expectation_figure, 
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.files import write_files
-from biodance.report.pages.dance_words import posture_said
-from biodance.report.pages.language import ENGLISH, N_, read_language
+from biodance.report.pages.language import ENGLISH, N_, posture_said, read_language
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema, markdown_table, plain_values, shown, to_text
 from biodance.report.terminal import print_line, print_table
@@ -53,18 +52,15 @@ def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS) -> str
         start = left + (room - wide) / 2 - scale * float(across.min())
         for name, outline, _ in sorted(parts, key=lambda one: one[2]):
             path = " ".join(f"{start + scale * u:.1f},{_TALL - scale * z:.1f}" for u, z in outline)
-            drawn.append(f'<polygon points="{path}" fill="{_colour(name)}"/>')
+            side = name.partition("_")[0]
+            colour = _MIDDLE if side not in SIDE_COLOURS or side == "middle" else SIDE_COLOURS[side][0]
+            drawn.append(f'<polygon points="{path}" fill="{colour}"/>')
         drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
         left += room + _GAP
     return (
         f'<svg role="img" aria-label="{title}" viewBox="-3 -6 {left:.0f} {_TALL + 22:.0f}" stroke="#fff" '
         f'stroke-width="0.8">{"".join(drawn)}</svg>'
     )
-
-
-def _colour(segment: str) -> str:
-    side = segment.partition("_")[0]
-    return SIDE_COLOURS[side][0] if side in SIDE_COLOURS and side != "middle" else _MIDDLE
 
 
 def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:

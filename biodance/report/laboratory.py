@@ -86,16 +86,12 @@ def _tolerances(found: LearnedLaboratory) -> list[str]:
     lines, before, within = [], shipped(), ""
     for line in to_toml(found.tolerances, under="tolerances").splitlines():
         within = line if line.startswith("[") else within
-        size = _SIZE.match(line) if within == "[tolerances.sizes]" else None
-        lines.append(f"{line}  # {_basis(size['key'], found, before.size(size['key']))}" if size else line)
+        if within == "[tolerances.sizes]" and (size := _SIZE.match(line)):
+            key, count = size["key"], found.shown.get(size["key"], 0.0)
+            basis = f"{count:.1f} values in {len(found.sessions)} sessions; shipped {before.size(key):.4g}"
+            line = f"{line}  # {'as shipped: no session shows it' if count < HARDLY else basis}"
+        lines.append(line)
     return lines
-
-
-def _basis(key: str, found: LearnedLaboratory, before: float) -> str:
-    count = found.shown.get(key, 0.0)
-    if count < HARDLY:
-        return "as shipped: no session shows it"
-    return f"{count:.1f} values in {len(found.sessions)} sessions; shipped {before:.4g}"
 
 
 def _norms(found: LearnedLaboratory) -> list[str]:

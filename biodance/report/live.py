@@ -90,11 +90,14 @@ def print_live(found: LiveResult, document: Row, console: Console) -> None:
 
 
 _LOOPBACK = "127.0.0.1"
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'"
-_PATIENCE = 10.0
-"""s for which a connection may say nothing."""
-_LAST = 2.0
-"""s that the end waits for the page to fetch it."""
+_HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "connect-src 'self'",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+}
+_PATIENCE = 10.0  # s for which a connection may say nothing
+_LAST = 2.0  # s that the end waits for the page to fetch it
 
 
 class _Server(ThreadingHTTPServer):
@@ -110,17 +113,7 @@ class _Server(ThreadingHTTPServer):
 
 class LivePage:
     """A page at ``address`` that shows the newest state of a stream; a context, closed at its end. Once it knows the
-    ``body`` it draws what is asked, too.
-
-    Parameters
-    ----------
-    port : int
-        Of 127.0.0.1; 0 takes a free one.
-
-    Raises
-    ------
-    BiodanceError
-        Another program has the port.
+    ``body`` it draws what is asked, too. ``port`` of 127.0.0.1, 0 takes a free one; BiodanceError where it is taken.
     """
 
     def __init__(self, port: int = 0) -> None:
@@ -203,14 +196,7 @@ class LivePage:
                 found = page._answer(self.path) if host in (_LOOPBACK, "localhost") else None
                 kind, body = found or ("text/plain", b"There is nothing here.")
                 self.send_response(200 if found else 404)
-                headers: Mapping[str, str] = {
-                    "Content-Type": kind,
-                    "Content-Length": str(len(body)),
-                    "Content-Security-Policy": _POLICY,
-                    "Cache-Control": "no-store",
-                    "X-Content-Type-Options": "nosniff",
-                }
-                for name, value in headers.items():
+                for name, value in {"Content-Type": kind, "Content-Length": str(len(body)), **_HEADERS}.items():
                     self.send_header(name, value)
                 self.end_headers()
                 self.wfile.write(body)

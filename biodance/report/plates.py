@@ -2,6 +2,7 @@
 out), and what `biodance plates` prints.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from biodance.diagnosis.archive.changes import ALL, Change, History, Stranger
+from biodance.diagnosis.archive.changes import ALL, Change, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.judge import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
@@ -92,31 +93,18 @@ def plates_document(found: PlatesJudged) -> Row:
 def _persons(found: PlatesJudged) -> list[Row]:
     """Return every person with visits, what stands out, and what conditions do in that person's visits."""
     judged = found.judgement
-    names = list(dict.fromkeys(visit.person for visit in judged.visits))
-    return [
-        {
-            "person": name,
-            "visits": sum(visit.person == name for visit in judged.visits),
-            "findings": [
-                *(_stranger(one) for one in judged.strangers if one.person == name),
-                *(_of_person(one, name) for one in judged.conditions if name in one.persons),
-            ],
-        }
-        for name in names
-    ]
-
-
-def _stranger(one: Stranger) -> Row:
-    much = said(one.quantity, one.value)
-    what = f"{one.visit or 'All visits'}: {spaced(one.quantity)} on {one.plate} differs by {much} from all others."
-    return _personal(what, one.quantity, one.value, one.sd)
-
-
-def _of_person(one: ConditionEffect, person: str) -> Row:
-    value, sd = one.persons[person]
-    much = said(one.quantity, value)
-    text = f"{one.factor} {one.level} reads {much} more than {one.factor} {one.base}."
-    return _personal(text, one.quantity, value, sd)
+    visits = Counter(visit.person for visit in judged.visits)
+    findings: dict[str, list[Row]] = {name: [] for name in visits}
+    for one in judged.strangers:
+        much, when = said(one.quantity, one.value), one.visit or "All visits"
+        text = f"{when}: {spaced(one.quantity)} on {one.plate} differs by {much} from all others."
+        findings.get(one.person, []).append(_personal(text, one.quantity, one.value, one.sd))
+    for shared in judged.conditions:
+        for name, (value, sd) in shared.persons.items():
+            much = said(shared.quantity, value)
+            text = f"{shared.factor} {shared.level} reads {much} more than {shared.factor} {shared.base}."
+            findings.get(name, []).append(_personal(text, shared.quantity, value, sd))
+    return [{"person": name, "visits": visits[name], "findings": some} for name, some in findings.items()]
 
 
 def _personal(text: str, quantity: str, value: float, sd: float) -> Row:
@@ -170,7 +158,12 @@ def plate_figure(plate: str, histories: tuple[History, ...]) -> "Figure":
         for axes in grid[len(own) :]:
             axes.remove()
         for k in {min((c + 1) * rows, len(own)) - 1 for c in range(columns)}:
-            _label(grid[k], own[k])
+            # dates, else names, of as many visits as fit
+            visits = own[k].series.visits
+            chosen = np.unique(np.linspace(0, len(visits) - 1, min(len(visits), 6)).round().astype(int))
+            words = [visits[i].date[:10] or visits[i].name[-12:] for i in chosen]
+            grid[k].tick_params(labelbottom=True)
+            grid[k].set_xticks(chosen, words, rotation=25, ha="right")
     return drawn
 
 
@@ -196,14 +189,6 @@ def _draw(axes: "Axes", plate: str, one: History) -> None:
             axes.axvspan(first - 0.5, last - 0.45, color=RED, alpha=0.15, linewidth=0)
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set_ylabel(f"{QUANTITY_TITLES[series.quantity]}\n({unit})")
-
-
-def _label(axes: "Axes", one: History) -> None:
-    """Write dates, else names, of as many visits as fit."""
-    visits = one.series.visits
-    chosen = np.unique(np.linspace(0, len(visits) - 1, min(len(visits), 6)).round().astype(int))
-    axes.tick_params(labelbottom=True)
-    axes.set_xticks(chosen, [visits[i].date[:10] or visits[i].name[-12:] for i in chosen], rotation=25, ha="right")
 
 
 def condition_figure(one: ConditionEffect) -> "Figure":
@@ -256,9 +241,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
 
 
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (which exists) and return the
-    numbers.
-    """
+    """Write ``report.html``, ``results.json``, ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
     document = plates_document(found)
     texts = {
         "results.json": to_text(document),

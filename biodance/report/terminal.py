@@ -170,9 +170,7 @@ def _print_performance(found: Row, console: Console) -> None:
 
 
 def print_foresight(found: Row, console: Console) -> None:
-    """Print what a movement will see, what it will confuse, what it cannot see and what to change first, of `biodance
-    foresee`.
-    """
+    """Print of `biodance foresee` what a movement will see, confuse and not see, and what to change first."""
     for sentence in filter(None, (found["summary"], found["learned"], found["plates"], found["care"])):
         print_line(console, sentence)
     print_line(console, f"will see: {causes_by_effect(seen_causes(found)) or 'nothing of what it looks for'}")
@@ -204,9 +202,7 @@ def _print_accepted(found: Row, console: Console) -> None:
 
 
 def print_diagnosis(found: Row, console: Console) -> None:
-    """Print of `biodance diagnose`: the headline, what was found with size and interval, what was judged, what is
-    left.
-    """
+    """Print of `biodance diagnose`: headline, what was found with size and interval, what was judged, what is left."""
     print_attention(found["attention"], console)
     for what, cause in found["failures"].items():
         print_line(console, "look: ", bold=f"not solved, {what}", then=f": {cause}")
@@ -226,7 +222,10 @@ def print_diagnosis(found: Row, console: Console) -> None:
         where = f"{worst['channel']}, {low:g} to {high:g} Hz, trial {worst['trial']}"
         print_line(console, f"left unexplained: {where} ({worst['z']:.0f} times what sessions without fault vary)")
     _print_judged(found["judged"], console)
-    _print_witnesses(found, console)
+    if found["witnesses"]:  # how many causes observations respond to
+        seen = sum(bool(row["witnesses"]) for row in found["witness_table"])
+        text = f"feet, clocks and empty plates would show {seen} causes and {len(found['witness_table']) - seen} not: "
+        print_line(console, f"{text}how small, and what looks like what, stands in the page and in results.json")
     for note in found["notes"]:
         print_line(console, f"note: {note}")
     if "accepted" in found:
@@ -243,15 +242,6 @@ def _print_judged(rows: Sequence[Row], console: Console) -> None:
             why.setdefault(without_path(row["why_not"], row["trial"]), []).append(row["trial"])
     for reason, trials in why.items():
         print_line(console, f"  {', '.join(trials)}: {reason}")
-
-
-def _print_witnesses(found: Row, console: Console) -> None:
-    """Print how many causes the observations respond to, and where it stands how well."""
-    if not found["witnesses"]:
-        return
-    seen, blind = (sum(bool(row["witnesses"]) is looked for row in found["witness_table"]) for looked in (True, False))
-    text = f"feet, clocks and empty plates would show {seen} causes and {blind} not: how small, and "
-    print_line(console, f"{text}what looks like what, stands in the page and in results.json")
 
 
 _PART = Schema("", shown="part: {name} | state: {state} | what: {text}")

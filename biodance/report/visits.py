@@ -136,20 +136,16 @@ def visit_place(one: Row) -> str:
 
 COMPARE_PAGE = "compare.html"
 _COLOURS = {"right": BLUE, "left": RED, "middle": BLUE}
-_DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")
-"""Of all visits but the last, in turn."""
-
-
-def _looks(count: int, side: str) -> list[Stroke]:
-    """Return how the curves of each visit look: the last one full in the side's colour, the others grey, dashed."""
-    return [*(Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(count - 1)), Stroke(_COLOURS[side], "", 1.6)]
+_DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")  # Of all visits but the last, in turn
 
 
 def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequence[str]) -> str:
     """Return one panel for each quantity of the cycles of a ``kind`` on a ``side``: the mean of every visit with one
     standard deviation between its cycles, and how many they are; "" where no quantity is known in two visits.
     """
-    looks, cells = _looks(len(found.visits), side), []
+    # the last visit is drawn full in the side's colour, the others grey and dashed
+    looks = [Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
+    looks, cells = [*looks, Stroke(_COLOURS[side], "", 1.6)], []
     by_visit = [{(one.kind, one.quantity, one.side): one for one in groups} for groups in found.curves()]
     for quantity in quantities:
         some = [groups.get((kind, quantity, side)) for groups in by_visit]

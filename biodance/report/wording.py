@@ -9,12 +9,10 @@ from biodance.display import SHOWN_UNITS, cause_in_words, spaced
 from biodance.identification.knowledge import SIGMAS
 from biodance.records.attention import Attention, told_together
 
-_ABSURD = 30.0
-"""Typical sizes above which a size from which something is seen means never."""
+_ABSURD = 30.0  # Typical sizes above which a size from which something is seen means never
 NEVER = "never"
 """Said of such a size."""
-_NAMED = 6
-"""Targets of a cause that are listed by name."""
+_NAMED = 6  # Targets of a cause that are listed by name
 
 
 def format_number(value: float | None, digits: int = 1) -> str:

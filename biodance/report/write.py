@@ -30,10 +30,15 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
-from biodance.report.tables.gait import gait_document
 from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
-from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
+from biodance.report.tables.session import (
+    PROVENANCE_ROW,
+    filter_document,
+    gait_document,
+    movement_document,
+    results_document,
+)
 
 PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 

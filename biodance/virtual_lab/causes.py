@@ -92,9 +92,7 @@ def _rope(performance: Performance, point: Array) -> tuple[Array, Array]:
 
 @acting
 def body_weight_support(performance: Performance, time: Array, target: str, force: float, stiffness: float) -> Array:
-    """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as
-    the person goes down.
-    """
+    """Hang a rope from the ceiling to the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as it goes down."""
     if performance.plan.role == "static":
         return np.zeros((time.size, 6))
     point = grip("pelvis", true_poses(performance, time))
@@ -140,8 +138,7 @@ class Spring:
     free: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-_FLESH = {"trunk_head": Spring(5.5, 0.3)}
-"""Viscera; other flesh hangs on `MUSCLE`."""
+_FLESH = {"trunk_head": Spring(5.5, 0.3)}  # Viscera; other flesh hangs on `MUSCLE`
 MUSCLE = Spring(9.0, 0.3)
 LIQUID = Spring(1.3, 0.08, (1.0, 1.0, 0.0))
 
@@ -235,15 +232,13 @@ class Scene:
     visit: LabVisit
     loads: tuple[AddedLoad, ...] = ()
 
+    def on_visit(self, **changes: Any) -> "Scene":
+        """Return the scene with ``changes`` of its visit."""
+        return replace(self, visit=replace(self.visit, **changes))
 
-def clock_of(protocol: Protocol) -> Clock:
-    """Return from and to where in the session (0 to 1) every trial lies, the trials one after another."""
-    ends = np.cumsum([trial.duration for trial in protocol.trials])
-    starts = ends - [trial.duration for trial in protocol.trials]
-    return {
-        t.name: (float(a / ends[-1]), float(b / ends[-1]))
-        for t, a, b in zip(protocol.trials, starts, ends, strict=True)
-    }
+    def pushed(self, force: AppliedForce) -> "Scene":
+        """Return the scene with one more force on the person."""
+        return self.on_visit(forces=(*self.visit.forces, force))
 
 
 _GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "time", "return")
@@ -281,20 +276,19 @@ def _load(cause: Hidden, scene: Scene) -> Scene:
 
 
 def _wobble(cause: Hidden, scene: Scene) -> Scene:
-    force = wobbling_mass(scene.person, cause.target, **cause.numbers(("mass",)))
-    return replace(scene, visit=replace(scene.visit, forces=(*scene.visit.forces, force)))
+    return scene.pushed(wobbling_mass(scene.person, cause.target, **cause.numbers(("mass",))))
 
 
 def _slosh(cause: Hidden, scene: Scene) -> Scene:
     load, force = sloshing_load(scene.person, cause.target, **cause.numbers(("mass", "sloshing")))
-    return replace(scene, loads=(*scene.loads, load), visit=replace(scene.visit, forces=(*scene.visit.forces, force)))
+    return replace(scene.pushed(force), loads=(*scene.loads, load))
 
 
 def _tilt(cause: Hidden, scene: Scene) -> Scene:
     """Turn the laboratory's axes by ``angle`` rad about lab x or y."""
     turn = np.array(scene.visit.tilt)
     turn[axis_index(cause.target)] += cause.numbers(("angle",))["angle"]
-    return replace(scene, visit=replace(scene.visit, tilt=tuple(turn)))
+    return scene.on_visit(tilt=tuple(turn))
 
 
 def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidden, Scene], Scene]:
@@ -302,8 +296,7 @@ def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidde
 
     def change(cause: Hidden, scene: Scene) -> Scene:
         moved = {**getattr(scene.visit, field), cause.target: np.array(cause.vector("shift", 3))}
-        changes: dict[str, Any] = {field: moved}
-        return replace(scene, visit=replace(scene.visit, **changes))
+        return scene.on_visit(**{field: moved})
 
     return change
 
@@ -317,16 +310,14 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
     }
     refuse_unknown("segment whose length can be wrong", cause.target, ends)
     shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
-    return replace(
-        scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})
-    )
+    return scene.on_visit(joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})
 
 
 def _prosthesis(cause: Hidden, scene: Scene) -> Scene:
     """Make the limb from a segment on ``lighter`` kg: a prosthesis."""
     limbs = {**scene.visit.lighter_limbs, cause.target: cause.numbers(("lighter",))["lighter"]}
     with_prostheses(scene.person, limbs)  # refused here, before anything is simulated
-    return replace(scene, visit=replace(scene.visit, lighter_limbs=limbs))
+    return scene.on_visit(lighter_limbs=limbs)
 
 
 def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
@@ -334,9 +325,7 @@ def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
 
     def change(cause: Hidden, scene: Scene) -> Scene:
         angle = cause.numbers(("angle",))["angle"]
-        return replace(
-            scene, visit=replace(scene.visit, tolerances=replace(scene.visit.tolerances, **{tolerance: angle}))
-        )
+        return scene.on_visit(tolerances=replace(scene.visit.tolerances, **{tolerance: angle}))
 
     return change
 
@@ -367,17 +356,20 @@ def conceal(cause: Hidden, scene: Scene) -> Scene:
     BiodanceError
         A parameter is missing, has a wrong name or an impossible value.
     """
-    visit = scene.visit
     if cause.name in IN_THE_PERSON:
         return IN_THE_PERSON[cause.name](cause, scene)
     if cause.name in FORCES:
         builder = FORCES[cause.name]
-        force = builder(cause.target, **cause.numbers(_parameters(builder)))
-        return replace(scene, visit=replace(visit, forces=(*visit.forces, force)))
+        return scene.pushed(builder(cause.target, **cause.numbers(_parameters(builder))))
     if cause.name not in FAULTS:
         raise UnknownName.of("effect that the virtual laboratory can make", cause.name, CAUSES)
-    fault = fault_of(cause, clock_of(scene.protocol))
-    return replace(scene, visit=replace(visit, faults=(*visit.faults, fault)))
+    ends = np.cumsum([trial.duration for trial in scene.protocol.trials])
+    starts = ends - [trial.duration for trial in scene.protocol.trials]
+    clock = {
+        trial.name: (float(start / ends[-1]), float(end / ends[-1]))
+        for trial, start, end in zip(scene.protocol.trials, starts, ends, strict=True)
+    }
+    return scene.on_visit(faults=(*scene.visit.faults, fault_of(cause, clock)))
 
 
 def parse_cause(text: str) -> Hidden:

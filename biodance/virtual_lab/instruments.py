@@ -40,10 +40,8 @@ TISSUES = {"pulled": (1.0, 1.0, 0.0), "swinging": (0.4, 3.0, 0.0), "wavy": (0.3,
 """Kinds of soft tissue: how many times as large as usual its pull by the joints, its swing under acceleration, and
 waves at frequencies of their own (Cheze 1995, doi:10.1016/0021-9290(94)00072-D) are.
 """
-_WAVES = (1.0, 8.0)
-"""rad/s between which the frequencies of waves lie: those of whole-body movement."""
-_BENT = 0.5
-"""rad: a wave is as large as what a joint pulls that is bent so far."""
+_WAVES = (1.0, 8.0)  # rad/s between which the frequencies of waves lie: those of whole-body movement
+_BENT = 0.5  # rad: a wave is as large as what a joint pulls that is bent so far
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +64,8 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     scale = np.zeros((len(joints), len(markers.names)))
     swing = np.zeros(len(markers.names))
     for k, (name, segment) in enumerate(zip(markers.names, markers.segment, strict=True)):
-        kind, side = _kind_and_side(TRUE_SEGMENTS[segment], name)
+        kind = next((k for k in ARM_AND_LEG if TRUE_SEGMENTS[segment].endswith(k)), TRUE_SEGMENTS[segment])
+        side = "right" if name.startswith("R") else "left"
         pulls = dict(virtual_people()["pull_mm_rad"][kind])
         if name.endswith(("SHO", "BAK")):
             pulls |= SHOULDER_PULL
@@ -92,12 +91,6 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     )
     pull = pulled * tolerances.soft_tissue * scale[..., None] * direction
     return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
-
-
-def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
-    """Return the kind of a true segment, and the side of the body a marker lies on."""
-    kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
-    return kind, "right" if marker.startswith("R") else "left"
 
 
 def reference_angles(person: Person) -> Array:
@@ -251,13 +244,6 @@ def lay_plate(
     return TruePlate(corners, true_turn, place, mixing, zero, side)
 
 
-def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
-    """Return the true wrench (T, 6) about the lab origin under one foot, under "both" or "none"."""
-    if side == "none":
-        return np.zeros((time.size, 6))
-    return performance.wrench(time).value if side == "both" else performance.foot_wrench(time, side)
-
-
 def sense_plate(
     performance: Performance,
     plate: TruePlate,
@@ -271,7 +257,12 @@ def sense_plate(
 
     ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
     """
-    value = contact_wrench(performance, time - tolerances.plate_delay, plate.side)
+    late = time - tolerances.plate_delay
+    if plate.side == "none":
+        value = np.zeros((time.size, 6))
+    else:  # about the lab origin, under one foot or both
+        both = plate.side == "both"
+        value = performance.wrench(late).value if both else performance.foot_wrench(late, plate.side)
     force, moment = value[:, :3] @ tilt.T, value[:, 3:] @ tilt.T
     at_centre = moment - np.cross(plate.centre, force)
     force, moment = force @ plate.turn, at_centre @ plate.turn

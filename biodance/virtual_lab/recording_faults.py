@@ -180,8 +180,7 @@ def mains_hum(channel: Channel, amplitude: float) -> Array:
     return channel.load + np.sin(2 * np.pi * 50 * np.arange(len(channel.load)) / channel.rate) * amplitude
 
 
-_SLACK = (10.0, 20.0, 40.0)
-"""N, half widths of the plays in the plate's joints; a third of it in N·m."""
+_SLACK = (10.0, 20.0, 40.0)  # N, half widths of the plays in the plate's joints; a third of it in N·m
 
 
 @on_channel

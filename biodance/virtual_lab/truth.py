@@ -102,11 +102,6 @@ def place_in_12(person: Person, load: AddedLoad) -> tuple[str, Array]:
     return segment, turn.T @ (part_origin + part_turn @ load.place - origin)
 
 
-def poses_12(person: Person, q: Array) -> TrueFrames:
-    """Return the lab poses (3, 3), (3,) m of the 12 true joint frames at the true configuration ``q`` (46,)."""
-    return _frames(person, person.body, q)[0]
-
-
 def _segments(sip: Sip) -> list[dict[str, Any]]:
     """Return per segment mass, CoM and inertia [Ixx Ixy Iyy Ixz Iyz Izz] about and in the segment's joint frame."""
     return [
@@ -188,7 +183,7 @@ def _static_pose(person: Person, instruments: Instruments, performances: list[Pe
     if static is None:
         return None
     time = round(0.5 * static.plan.duration, 2)
-    frames = poses_12(person, static.motion(np.array([time])).q[0])
+    frames = _frames(person, person.body, static.motion(np.array([time])).q[0])[0]
     tilt = instruments.tilt
     segments = [
         {"name": n, "rotation": (tilt @ turn).tolist(), "position_m": (tilt @ at).tolist()}

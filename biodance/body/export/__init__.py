@@ -203,7 +203,10 @@ def write_model(
     if kind.FORMAT not in _OF_SEGMENTS:
         body = parts_as_segments(body)
         refuse_impossible(body)
-    content = _content(kind, body, source, solids)
+    write: Callable[..., str | bytes] = getattr(kind, "data", None) or kind.text
+    if solids is not None and "solids" not in inspect.signature(write).parameters:
+        raise BiodanceError(f"The format {kind.FORMAT} shows no meshes. Leave them out, or choose glb or osim.")
+    content = write(body, source) if solids is None else write(body, source, solids)
     beside = kind.beside(body, solids) if solids is not None and hasattr(kind, "beside") else {}
     new = {path.parent / name: data for name, data in beside.items()}
     new = {file: data for file, data in new.items() if not (file.is_file() and file.read_bytes() == data)}
@@ -212,13 +215,5 @@ def write_model(
     for file, data in new.items():
         file.parent.mkdir(exist_ok=True)
         write_whole(file, data)
+    content = content if isinstance(content, bytes) else str(content).encode()
     return write_whole(path, content)  # last: a model that is there has all that it names
-
-
-def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids | None) -> bytes:
-    """Return the file as bytes, by ``data`` or by ``text``."""
-    write: Callable[..., str | bytes] = getattr(member, "data", None) or member.text
-    if solids is not None and "solids" not in inspect.signature(write).parameters:
-        raise BiodanceError(f"The format {member.FORMAT} shows no meshes. Leave them out, or choose glb or osim.")
-    content = write(body, source) if solids is None else write(body, source, solids)
-    return content if isinstance(content, bytes) else str(content).encode()

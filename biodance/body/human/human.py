@@ -309,16 +309,6 @@ _LUMBAR_HEIGHT = 0.112 / 1.755
 """Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
 
 
-def _shape_boxes(skeleton: Skeleton) -> Array:
-    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature, in the segment frames."""
-    table = read_table("human", "boxes")
-    columns = "x_min y_min z_min x_max y_max z_max"
-    corners = np.array([row_numbers(table.row(segment=kind_of(s)), columns) for s in SEGMENTS])
-    boxes = corners.reshape(-1, 2, 3) * skeleton.stature
-    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - _LUMBAR_HEIGHT * skeleton.stature
-    return boxes
-
-
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
     """Return where the CoM may be, (12, 2, 3) m: three standard deviations around the prior, inside the shape box."""
     half = _COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
@@ -404,7 +394,10 @@ def assemble(
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
     measured = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
     skeleton = replace(skeleton, lengths={**skeleton.lengths, **measured})
-    usual, boxes = reference(table, subject), _shape_boxes(skeleton)
+    usual, corners = reference(table, subject), "x_min y_min z_min x_max y_max z_max"
+    rows = [row_numbers(read_table("human", "boxes").row(segment=kind_of(s)), corners) for s in SEGMENTS]
+    boxes = np.array(rows).reshape(-1, 2, 3) * skeleton.stature
+    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - _LUMBAR_HEIGHT * skeleton.stature
     opinions = body_opinions(usual, skeleton, subject)
     sip = prior(usual, skeleton, subject, opinions)
     along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None

@@ -279,23 +279,19 @@ def _marker_leg(place: Mapping[str, Array], side: str) -> float:
     return float(np.linalg.norm(asis - knee) + np.linalg.norm(knee - ankle))
 
 
-def _bent(place: Mapping[str, Array], side: str) -> bool:
-    """Return whether somebody sits: from the pelvis to the knee a leg goes ahead farther than down."""
-    asis, knee = (place[f"{side}_{name}"] for name in ("asis", "knee_lateral"))
-    return bool(np.hypot(*(knee - asis)[:2]) > asis[2] - knee[2])
-
-
 def _contradicted(
     given: Mapping[str, float], width: float, place: Mapping[str, Array]
 ) -> tuple[dict[str, NotUsed], str]:
     """Return the typed lengths of legs that the markers contradict, by their name in ``given``, and what to do; and a
     warning where they contradict the typed width of the pelvis, of which the markers' is used anyway ("" if not).
     """
+    # whoever sits has a leg that goes ahead farther than down from the pelvis to the knee
+    thigh = {side: place[f"{side}_knee_lateral"] - place[f"{side}_asis"] for side in SIDES}
+    seated = {side: bool(np.hypot(*along[:2]) > -along[2]) for side, along in thigh.items()}
     legs = {
         name.lower(): NotUsed(f"Not used: {said}")
         for side, name in ((side, f"{letter}LegLength") for side, letter in _LETTER.items())
-        if not _bent(place, side)
-        and (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
+        if not seated[side] and (said := _unlike(name, given.get(name.lower()), _marker_leg(place, side), _LEG_BETWEEN))
     }
     said = _unlike("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)
     return legs, Doubt(said.rstrip("."), mended=True) if said else ""

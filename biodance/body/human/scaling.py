@@ -1,6 +1,4 @@
-"""The human of one subject: joint centres, segment lengths, constant joint tilts and every marker from the static
-trial.
-"""
+"""The human of one subject from the static trial: joint centres, lengths, constant joint tilts and every marker."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

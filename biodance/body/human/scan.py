@@ -29,19 +29,11 @@ class _Section(NamedTuple):
 
 
 def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
-    """Return the part of a closed surface on the side of a plane to which its normal points, closed in the plane.
+    """Return the part (m, 3, 3) m of a closed surface on the side of a plane to which its normal points, closed in the
+    plane; pieces that close the cut may overlap with opposite signs: sums over them are exact.
 
-    Parameters
-    ----------
-    triangles : array_like
-        (n, 3, 3) m, corners counter-clockwise from outside.
-    point, normal : array_like
-        (3,) a point of the plane, m, and its normal of length one.
-
-    Returns
-    -------
-    Array
-        (m, 3, 3) m. Pieces that close the cut may overlap with opposite signs: sums over them are exact.
+    ``triangles`` (n, 3, 3) m, corners counter-clockwise from outside; ``point`` (3,) m of the plane, ``normal`` (3,) of
+    length one.
     """
     height = _heights(triangles, point, normal)
     above = height > 0
@@ -115,22 +107,11 @@ class _Scan:
 
 @functools.lru_cache(maxsize=4)
 def read_scan(path: str, stature: float, up: str = "z") -> _Scan:
-    """Return the scan of a person who stands upright with the arms away from the trunk.
+    """Return the scan (``path`` of an OBJ, STL or PLY in m, its axis ``up`` points up) of a person of some ``stature``
+    m who stands upright with the arms away from the trunk.
 
-    Parameters
-    ----------
-    path : str
-        OBJ, STL or PLY, in m.
-    stature : float
-        Of the person, m.
-    up : {"z", "y", "x"}
-        Axis of the file that points up.
-
-    Raises
-    ------
-    SessionRefused
-        The file is missing or no mesh; the surface is not closed; it is not in m, lies, has no feet or is of somebody
-        else's stature.
+    Raises SessionRefused: the file is missing or no mesh; the surface is not closed; it is not in m, lies, has no feet
+    or is of somebody else's stature.
     """
     try:
         mesh = read_mesh(Path(path))
@@ -261,13 +242,12 @@ def cut_scan(scan: _Scan, skeleton: Skeleton) -> ScannedBody:
         lumps |= _leg(leg, skeleton, side, ankle, hip, cuts)
     lumps |= _trunk(high, scan, skeleton, middle, cuts)
     lengths = {**skeleton.lengths, "trunk_head": scan.height - middle[1] - skeleton.lengths["pelvis"]}
-    return ScannedBody(lumps, cuts, {name: _surface(lumps[name], name, lengths[name]) for name in SEGMENTS})
-
-
-def _surface(lump: RigidInertia, segment: str, length: float) -> float:
-    """Return kg/m that a cylinder of this mass gains with its radius."""
-    part = {"pelvis": "lower_trunk", "trunk_head": "upper_trunk"}.get(segment, kind_of(segment))
-    return 2.0 * float(np.sqrt(np.pi * lump.mass * _density(part) * length))
+    surfaces = {}
+    for name in SEGMENTS:
+        # a cylinder of mass m = rho pi r² l gains dm/dr = 2 rho pi r l = 2 sqrt(pi m rho l)
+        part = {"pelvis": "lower_trunk", "trunk_head": "upper_trunk"}.get(name, kind_of(name))
+        surfaces[name] = 2.0 * float(np.sqrt(np.pi * lumps[name].mass * _density(part) * lengths[name]))
+    return ScannedBody(lumps, cuts, surfaces)
 
 
 def _hip(scan: _Scan, skeleton: Skeleton, side: str) -> tuple[Array, Array]:
@@ -298,10 +278,14 @@ def _leg(
     thigh, below = (clip_surface(leg, knee.place, sign * along) for sign in (1, -1))
     shank, foot = (clip_surface(below, ankle, sign * _UP) for sign in (1, -1))
     cuts |= {f"{side}_knee": _slope(knee, "thigh"), f"{side}_ankle": _slope(low, "shank")}
+    whole = _lump(foot, "foot", ankle, _UP)
+    # the foot's long axis, about which it has least inertia, is turned about the vertical so that it points ahead
+    spread = np.linalg.eigh(whole.inertia[np.ix_([0, 2], [0, 2])])[1][:, 0]
+    c, s = spread * np.sign(spread[0] or 1.0)
     return {
         f"{side}_thigh": _lump(thigh, "thigh", hip, hip - knee.place),
         f"{side}_shank": _lump(shank, "shank", knee.place, knee.place - ankle),
-        f"{side}_foot": _toes_ahead(_lump(foot, "foot", ankle, _UP)),
+        f"{side}_foot": turn_inertia(whole, np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])),
     }
 
 
@@ -309,13 +293,6 @@ def _joint(part: Array, place: Array, normal: Array) -> _Cut:
     """Return the joint in the middle of the section through ``place`` (3,) m."""
     section = cut_section(part, place, normal)
     return _Cut(section.middle, normal, section.area)
-
-
-def _toes_ahead(foot: RigidInertia) -> RigidInertia:
-    """Return the foot turned about the vertical so that its long axis points ahead."""
-    spread = np.linalg.eigh(foot.inertia[np.ix_([0, 2], [0, 2])])[1][:, 0]
-    c, s = spread * np.sign(spread[0] or 1.0)
-    return turn_inertia(foot, np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
 
 
 def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array) -> tuple[Array, Array, _Cut, _Cut]:

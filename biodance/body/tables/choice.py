@@ -34,25 +34,25 @@ PARTS = {
 """Which of the ten parts make which segment of the model."""
 
 
+BASE = "de_leva_1996"
+"""The table that completes a user's own, unless its .toml says otherwise (``completed_by``)."""
+_shipped = cache(read_segment_table)
+
+
 def de_leva(subject: Subject) -> Reference:
     """Return the reference woman (1.735 m) or man (1.741 m) of de Leva 1996, Table 4."""
     sex = subject.sex
-    return _joined("de_leva_1996", _de_leva_stature(sex), sex, parts(sex))
+    return _joined(BASE, _de_leva_stature(sex), sex, parts(sex))
 
 
 def _de_leva_stature(sex: Sex) -> float:
     """Return the stature of the reference person, m."""
-    return float(_table().provenance["reference_stature_m"][sex])
-
-
-@cache
-def _table() -> SegmentTable:
-    return read_segment_table("de_leva_1996")
+    return float(_shipped(BASE).provenance["reference_stature_m"][sex])
 
 
 def length(segment: str, sex: Sex) -> float:
     """Return the length of a segment, m, of the reference person."""
-    return _table().value(segment, "length", sex=sex)
+    return _shipped(BASE).value(segment, "length", sex=sex)
 
 
 def lengths(sex: Sex) -> dict[str, float]:
@@ -99,7 +99,7 @@ def parts(sex: Sex) -> dict[str, RigidInertia]:
 
 def _sizes(segment: str, sex: Sex) -> tuple[float, float, float]:
     """Return mass fraction, length m and CoM as a fraction of it."""
-    table = _table()
+    table = _shipped(BASE)
     along = table.value(segment, "com", "longitudinal", sex=sex)
     return table.value(segment, "mass", sex=sex), table.value(segment, "length", sex=sex), along
 
@@ -107,14 +107,14 @@ def _sizes(segment: str, sex: Sex) -> tuple[float, float, float]:
 def _down(segment: str, sex: Sex, top: float) -> RigidInertia:
     """Return the lump of a segment whose origin is at height ``top`` m and whose end lies under it."""
     mass, size, fraction = _sizes(segment, sex)
-    radii = np.array(_table().values(segment, "gyration", "sagittal longitudinal transverse", sex=sex)) * size
+    radii = np.array(_shipped(BASE).values(segment, "gyration", "sagittal longitudinal transverse", sex=sex)) * size
     return RigidInertia(mass, np.array([0.0, top - fraction * size, 0.0]), mass * np.diag(radii**2))
 
 
 def _foot(sex: Sex) -> RigidInertia:
     """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle."""
     mass, size, fraction = _sizes("foot", sex)
-    radii = np.array(_table().values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
+    radii = np.array(_shipped(BASE).values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
     forward = (fraction - proportion("heel_behind_ankle", sex)) * size
     return RigidInertia(
         mass,
@@ -126,7 +126,8 @@ def _foot(sex: Sex) -> RigidInertia:
 def dumas(subject: Subject) -> Reference:
     """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder in de Leva's proportion."""
     sex = subject.sex
-    height, forearm = float(_dumas_table().provenance["reference_stature_m"][sex]), _dumas_length("forearm", sex)
+    height = float(_shipped("dumas_2018").provenance["reference_stature_m"][sex])
+    forearm = _dumas_length("forearm", sex)
     lengths = {kind: _dumas_length(kind, sex) for kind in ("pelvis", "thigh", "shank", "upper_arm")}
     lengths |= {"forearm_hand": forearm, "foot": proportion("foot_length", sex) * height}
     lengths["trunk_head"] = length("trunk_3", sex) / _de_leva_stature(sex) * height
@@ -136,13 +137,8 @@ def dumas(subject: Subject) -> Reference:
     return normalised_person("dumas_2018", height, lengths, {"pelvis": _trunk_parts(sex)[0], **lumps})
 
 
-@cache
-def _dumas_table() -> SegmentTable:
-    return read_segment_table("dumas_2018")
-
-
 def _dumas_length(segment: str, sex: Sex) -> float:
-    return _dumas_table().value(segment, "length", sex=sex)
+    return _shipped("dumas_2018").value(segment, "length", sex=sex)
 
 
 def _trunk_parts(sex: Sex) -> tuple[RigidInertia, RigidInertia, RigidInertia, RigidInertia]:
@@ -159,7 +155,7 @@ def _trunk_parts(sex: Sex) -> tuple[RigidInertia, RigidInertia, RigidInertia, Ri
 
 def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
     """Return the lump of a segment; ``origin`` m: height of the table's origin in the model's segment frame."""
-    table, length = _dumas_table(), _dumas_length(segment, sex)
+    table, length = _shipped("dumas_2018"), _dumas_length(segment, sex)
     mass = table.value(segment, "mass", sex=sex)
     com = np.array(table.values(segment, "com", "x y z", sex=sex)) * length + [0.0, origin, 0.0]
     xx, yy, zz, xy, xz, yz = (
@@ -362,8 +358,6 @@ def _lump(
     return RigidInertia(mass, com, mass * (inertia * np.outer(wider, wider)))  # correlations are kept
 
 
-BASE = "de_leva_1996"
-"""The table that completes a user's own, unless its .toml says otherwise (``completed_by``)."""
 _LAYOUTS: Mapping[str, Callable[[Subject], Reference]] = {
     "along_segments": de_leva,
     "full_tensors": dumas,

@@ -15,8 +15,7 @@ from biodance.spatial import axis_rotation
 
 LEAST_LIFT, _FREE = 5.0, 180.0
 """degrees that are legal: nobody keeps an arm closer to the trunk on purpose, and no farther away."""
-_KEPT = 0.03
-"""rad that known postures keep from it."""
+_KEPT = 0.03  # rad that known postures keep from it
 _X, _Y, _Z = np.eye(3)
 
 

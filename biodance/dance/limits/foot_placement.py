@@ -12,8 +12,7 @@ from biodance.dance.problem.state import State
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES
 
-_STILL = 1e-6
-"""m, rad: how far a planted foot may be from where it stands: rounding."""
+_STILL = 1e-6  # m, rad: how far a planted foot may be from where it stands: rounding
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,9 @@ from biodance.records import Array
 
 SAMPLES = np.linspace(0.0, 1.0, 33)
 """Places on the axis of a capsule that are held against a box in each round of the search."""
-_ROUNDS = 6
-"""Of the search, which leaves a sixteenth of the line each time."""
-_ENOUGH = 0.05
-"""m: a distance above it is given as what is certain."""
-_POINTS = 5
-"""Points on the axis of a capsule for the first look."""
+_ROUNDS = 6  # Of the search, which leaves a sixteenth of the line each time
+_ENOUGH = 0.05  # m: a distance above it is given as what is certain
+_POINTS = 5  # Points on the axis of a capsule for the first look
 
 
 @dataclass(frozen=True)
@@ -159,8 +156,7 @@ def deepest(ends: Array, half: Array) -> Array:
 
 _CLOSE = 0.25
 """m between the axes of two segments whose distance is worked out; others' is a lower bound."""
-_LOOKS = 4
-"""Places on a limb at which it is held against a box before its distance is worked out."""
+_LOOKS = 4  # Places on a limb at which it is held against a box before its distance is worked out
 
 
 def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple[Array, tuple[str, ...]]:

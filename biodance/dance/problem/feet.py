@@ -15,8 +15,7 @@ from biodance.records import SIDES, Array
 
 AROUND = 0.025
 """m of plate around the soles: nobody stands exactly on the marks, and soles are known to about 1 cm."""
-_ROUNDING = 1e-9
-"""m."""
+_ROUNDING = 1e-9  # m
 
 
 def room_on_plates(stances: Iterable[Stance]) -> Array:

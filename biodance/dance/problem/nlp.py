@@ -133,8 +133,7 @@ class Solution:
 
 
 WEIGHT = 100.0
-_NEAR = 1.5
-"""Margins (in their scale) larger than this cannot become active within one step."""
+_NEAR = 1.5  # Margins (in their scale) larger than this cannot become active within one step
 
 
 _RADIUS, _SETTLED = 0.3, 1e-3

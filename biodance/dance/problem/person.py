@@ -13,9 +13,8 @@ from biodance.body.body import Body
 from biodance.body.parts import JointLimits
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
-from biodance.dance.problem.plan import LEAST_REST, Plan
+from biodance.dance.problem.plan import LEAST_REST, Plan, finite_number, sentences, table, true_or_false
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
-from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.library import read_toml
 from biodance.records import SIDES
@@ -33,10 +32,8 @@ _RESTING = {
     "hip_rotation": (math.radians(5.0), "Whoever stands or sits upright turns the hips a little"),
 }
 """rad to both sides of straight that nobody can do without, and why."""
-_FITS = math.radians(3.0)
-"""rad less at which the seat is soft enough."""
-_LEAST_RANGE = math.radians(6.0)
-"""rad: nobody holds a joint within less."""
+_FITS = math.radians(3.0)  # rad less at which the seat is soft enough
+_LEAST_RANGE = math.radians(6.0)  # rad: nobody holds a joint within less
 _LIMBS = {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee", "ankle")}
 """What an arm and a leg are made of."""
 
@@ -262,8 +259,7 @@ GRADES = {"grade 5": 1.0, "grade 4": 0.6, "grade 3": 0.25}
 gravity.
 """
 _RIGHT_ANGLE = math.pi / 2
-_SEAT = (0.3, 1.2)
-"""m that a seat may be high."""
+_SEAT = (0.3, 1.2)  # m that a seat may be high
 _Ranges = list[tuple[str, float, float]]
 
 PLAIN_MOVEMENTS = {
@@ -362,9 +358,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
     cannot = _listed(path, raw, "cannot", "movement", _CANNOT)
     barred = [side for side in SIDES if f"stand on {side} leg" in cannot]
     legs = [leg for leg in _listed(path, raw, "stand_alone_on", "leg", SIDES, usual=SIDES) if leg not in barred]
-    seated = raw.get("seated", False)
-    if not isinstance(seated, bool):
-        raise BiodanceError(f"{path}: seated = {seated!r}; expected true or false.")
+    seated = true_or_false(path, "seated", raw.get("seated", False))
     ranges = [*_at_most(path, raw), *_ranges(path, raw)]
     if "turn" in cannot:
         ranges.append(("trunk_rotation", 0.0, 0.0))
@@ -421,7 +415,10 @@ def _at_most(path: Path, raw: dict[str, Any]) -> _Ranges:
         angle = finite_number(path, f"at_most_deg.{key}", value)
         if not 0 <= angle <= 180:
             raise BiodanceError(f"{path}: at_most_deg.{key} = {angle:g}; expected 0 to 180 degrees in its direction.")
-        for joint, sense in moved_joints(key, f"at_most_deg of {path}"):
+        moved = named_movement(key)
+        if moved is None:
+            raise UnknownName.of(f"movement in at_most_deg of {path}", key, (*_MOVES, *_JOINTS))
+        for joint, sense in moved:
             low, high = sorted((math.radians(angle) * sense, -math.inf * sense))
             out.append((joint, low, high))
     return out
@@ -454,32 +451,19 @@ def _ranges(path: Path, raw: dict[str, Any]) -> _Ranges:
 
 
 def _shares(path: Path, raw: dict[str, Any], name: str) -> Shares:
-    given = table(path, raw, name)
-    if name == "strength":
-        given = {key: _graded(path, key, value) for key, value in given.items()}
+    given, grades = dict(table(path, raw, name)), GRADES if name == "strength" else {}
+    for key, value in given.items():
+        if grades and isinstance(value, str) and value not in grades:
+            raise BiodanceError(
+                f"{path}: strength.{key} = {value!r}; expected a share from 0 to 1, or {', '.join(GRADES)}. A limb of "
+                f"less does not hold itself up: say 0 of its movements under at_most_deg."
+            )
+        given[key] = grades[value] if grades and isinstance(value, str) else value
     found = tuple((plain(key), finite_number(path, f"{name}.{key}", value)) for key, value in given.items())
     for key, value in found:
         if not 0 <= value <= 1:
             raise BiodanceError(f"{path}: {name}.{key} = {value:g}; a share lies between 0 and 1.")
     return found
-
-
-def _graded(path: Path, key: str, value: object) -> object:
-    """Return the share of a grade of strength, anything else as it is."""
-    if isinstance(value, str) and value not in GRADES:
-        raise BiodanceError(
-            f"{path}: strength.{key} = {value!r}; expected a share from 0 to 1, or {', '.join(GRADES)}. A limb of less "
-            f"does not hold itself up: say 0 of its movements under at_most_deg."
-        )
-    return GRADES[value] if isinstance(value, str) else value
-
-
-def moved_joints(key: str, where: str) -> tuple[tuple[str, int], ...]:
-    """Return the joints, with their side if named, and senses of a movement; UnknownName, found ``where``, if none."""
-    moved = named_movement(key)
-    if moved is None:
-        raise UnknownName.of(f"movement in {where}", key, (*_MOVES, *_JOINTS))
-    return moved
 
 
 def named_movement(key: str) -> tuple[tuple[str, int], ...] | None:

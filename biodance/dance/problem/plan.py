@@ -44,6 +44,7 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
 Only [postures] is needed; everything else has the value of the paper or none.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -54,10 +55,40 @@ import numpy as np
 from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.dance.problem.stance import Stance
-from biodance.dance.problem.told import finite_number, sentences, table
 from biodance.errors import BiodanceError, refuse_unknown
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
+
+
+def sentences(path: Path, raw: dict[str, Any]) -> tuple[str, ...]:
+    """Return what a TOML file says under ``care``; BiodanceError if it is no list of sentences."""
+    found = raw.get("care", [])
+    if not isinstance(found, list) or not all(isinstance(one, str) and one.strip() for one in found):
+        raise BiodanceError(f'{path}: care = {found!r}; expected sentences in a list, as ["A helper stands beside."].')
+    return tuple(found)
+
+
+def true_or_false(path: Path, key: str, value: object) -> bool:
+    """Return ``value``; BiodanceError names its ``key`` if it is neither true nor false."""
+    if not isinstance(value, bool):
+        raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
+    return value
+
+
+def finite_number(path: Path, where: str, value: object) -> float:
+    """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise BiodanceError(f"{path}: {where} = {value!r}; expected a finite number.")
+    return float(value)
+
+
+def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[str, Any]:
+    """Return a table of a TOML file, empty if it is missing; BiodanceError if it is something else."""
+    value = raw.get(key, {})
+    if not isinstance(value, dict):
+        raise BiodanceError(f"{path}: [{of}{key}] must be a table, found {value!r}.")
+    return value
+
 
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
@@ -67,10 +98,8 @@ USUAL_PLATE = (0.40, 0.60)
 """m from side to side and ahead: the commonest force plate (AMTI BP400600, Kistler 9281), long side ahead."""
 LEAST_REST = 10.0
 """s of dancing, at least, before a rest."""
-_PLATE = (0.2, 3.0)
-"""m that a side of a plate, or of several that touch, may have."""
-_BRIEF = 1.0
-"""s that postures in between are held at most."""
+_PLATE = (0.2, 3.0)  # m that a side of a plate, or of several that touch, may have
+_BRIEF = 1.0  # s that postures in between are held at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +232,7 @@ _NUMBERS = {
     "rest_after_s": "rest",
 }
 """Key of the file: field of the Plan."""
-_SHORT = {"share_of_support": ("balance", "share")}
-"""Key of the file: limit and its number."""
+_SHORT = {"share_of_support": ("balance", "share")}  # Key of the file: limit and its number
 _FLAGS = ("free", "gentle", "deep", "lively")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
@@ -232,7 +260,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
     for key in raw:
         refuse_unknown(f"key of {path}", key, _KEYS)
     words = {key: str(raw[name]) for key, name in (("ranges", "ranges"), ("whom", "for")) if name in raw}
-    flags = {name: _flag(path, name, raw[name]) for name in _FLAGS if name in raw}
+    flags = {name: true_or_false(path, name, raw[name]) for name in _FLAGS if name in raw}
     free = flags.pop("free", False)
     fields: dict[str, Any] = (
         ({} if free else dict(_FOLLOWABLE))
@@ -256,12 +284,6 @@ def read_plan(name_or_path: str | Path) -> Plan:
         weights=tuple(weights.items()),
     )
     return replace(plan, limits=_limits(path, raw, {} if free else {"balance": {"share": FOLLOWABLE_SHARE}}), **fields)
-
-
-def _flag(path: Path, key: str, value: object) -> bool:
-    if not isinstance(value, bool):
-        raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
-    return value
 
 
 def _plate(path: Path, value: object) -> tuple[float, float]:

@@ -45,12 +45,6 @@ def capsule_pairs(body: Body) -> list[tuple[int, int]]:
     return pairs
 
 
-def box_pairs(body: Body) -> list[tuple[int, int]]:
-    """Return the pairs (limb, trunk or pelvis) that must not touch: the forearms against both."""
-    arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]
-    return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
-
-
 class Pairs(NamedTuple):
     """Pairs of segments (indices) to keep apart: ``limbs`` two limbs, ``boxes`` a limb and a box. ``unchecked`` names
     those that cannot be kept apart because they overlap at zero angles.
@@ -62,13 +56,14 @@ class Pairs(NamedTuple):
 
 
 def pairs_of(body: Body) -> Pairs:
-    """Return the pairs of segments that must not touch: by name in a person's body, else by the tree."""
-    return Pairs(capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)
-
-
-def _is_named(body: Body) -> bool:
+    """Return the pairs of segments that must not touch: by name in a person's body (forearms against trunk and pelvis,
+    limbs as `capsule_pairs`), else by the tree.
+    """
     named = {kind for pair in _KINDS for kind in pair} | set(BOXES)
-    return all(segment.removeprefix("right_").removeprefix("left_") in named for segment in body.segments)
+    if not all(segment.removeprefix("right_").removeprefix("left_") in named for segment in body.segments):
+        return tree_pairs(body)
+    arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]
+    return Pairs(capsule_pairs(body), [(arm, body.segment_index(box)) for arm in arms for box in BOXES])
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +98,8 @@ def palm(body: Body, side: str) -> tuple[int, Array]:
 
 _NEAR = 2
 """Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
-_POINTS = 41
-"""On a limb's axis, at which it is held against others at zero angles."""
-_LEAST = 0.01
-"""Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
+_POINTS = 41  # On a limb's axis, at which it is held against others at zero angles
+_LEAST = 0.01  # Half length of a capsule in a cube, in its radius: a line of no length has no direction
 
 
 def capsule(body: Body, segment: int) -> tuple[Array, float]:

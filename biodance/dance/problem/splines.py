@@ -15,8 +15,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
 from biodance.records import Array, Index, freeze
 
-_DEGREE = 5
-"""Order six: continuous up to the fourth derivative."""
+_DEGREE = 5  # Order six: continuous up to the fourth derivative
 _THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 

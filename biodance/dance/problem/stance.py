@@ -21,8 +21,7 @@ _COMMON = 0.5
 """Of the depth in the base of the foot over which the weight is, in that of both: where as much was asked of both,
 imprecise people came as near as 1 mm to the edge of the foot as they lifted the other one.
 """
-_FORWARD = 0.2
-"""m: how far the right foot stands in front (paper III.D, human subject)."""
+_FORWARD = 0.2  # m: how far the right foot stands in front (paper III.D, human subject)
 SINGLE = {"single_right": (0,), "single_left": (1,)}
 STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
 """(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
@@ -255,8 +254,7 @@ def support_depth(stances: Sequence[Stance], on: Index, point: Array, share: flo
     return out
 
 
-_TINY = 1e-30
-"""Step of the complex-step derivative: exact to machine precision."""
+_TINY = 1e-30  # Step of the complex-step derivative: exact to machine precision
 
 
 def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:

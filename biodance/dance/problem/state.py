@@ -22,6 +22,8 @@ from biodance.records import Array
 from biodance.spatial import spatial_cross, wrench_of_force
 
 _Index = list[int] | NDArray[np.intp]
+_OF_MOTION = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes", "zmp", "zmp_slopes")
+"""What of a state does not depend on which feet bear it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,16 +159,16 @@ class State:
     def alone(self) -> "State":
         """The same motion with everything on the foot over which the weight is."""
         assert self.stance.over is not None
-        other = replace(self, stance=self.stance.on(self.stance.over))
-        shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes", "zmp", "zmp_slopes")
-        other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
-        return other
+        return self._sharing(replace(self, stance=self.stance.on(self.stance.over)), _OF_MOTION)
 
     @property
     def judged(self) -> "State":
         """The same motion without slopes."""
-        other = replace(self, sloped=False)
-        other.__dict__.update({name: self.__dict__[name] for name in ("_frames",) if name in self.__dict__})
+        return self._sharing(replace(self, sloped=False), ("_frames",))
+
+    def _sharing(self, other: "State", names: tuple[str, ...]) -> "State":
+        """Return the ``other`` state with what is worked out here already under these ``names``."""
+        other.__dict__.update({name: self.__dict__[name] for name in names if name in self.__dict__})
         return other
 
     @cached_property
@@ -227,13 +229,10 @@ def close_legs(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> St
     twists = still.twists
     for columns in legs:
         v[:, columns] = _solve(twists[:, columns], -np.einsum("tic,ti->tc", twists[:, :ROOT], v[:, :ROOT]))
-    moving = State(chain, stance, x, v.copy(), a)
-    moving.__dict__["_frames"] = still._frames
+    moving = still._sharing(State(chain, stance, x, v.copy(), a), ("_frames",))
     for columns in legs:
         a[:, columns] = _solve(twists[:, columns], -moving.acceleration[:, columns[-1]])
-    state = State(chain, stance, x, v, a)
-    state.__dict__["_frames"] = still._frames
-    return state
+    return still._sharing(State(chain, stance, x, v, a), ("_frames",))
 
 
 def _solve(twists: Array, right: Array) -> Array:

@@ -193,8 +193,7 @@ def move_task(work: DesignContext, before: DanceStep, after: DanceStep, *, slowe
     return Task(work.chain, work.blocks, feet, ends, slower * work.plan.move, work.plan.limits)
 
 
-_KEPT = ("via", "duration", "gram", "violation", "limit", "stops")
-"""What a checkpoint keeps of a move."""
+_KEPT = ("via", "duration", "gram", "violation", "limit", "stops")  # What a checkpoint keeps of a move
 
 
 def with_exciting_moves(work: DesignContext, course: Course[PlainStep], attempt: int = 0) -> Course[PlainStep]:

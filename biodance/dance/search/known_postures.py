@@ -5,7 +5,6 @@ words can make on given feet, with the pelvis where it keeps the balance.
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,10 +44,8 @@ _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
 """Joints by what moves."""
 _FITS = np.radians(25.0)
 """rad: a word that a person's range shortens by more is not asked of that person."""
-_CUT = np.radians(10.0)
-"""rad by which a word may be cut short without saying so."""
-_STOP = np.radians(1.5)
-"""rad that a word keeps from a joint's stop."""
+_CUT = np.radians(10.0)  # rad by which a word may be cut short without saying so
+_STOP = np.radians(1.5)  # rad that a word keeps from a joint's stop
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,14 @@ def read_vocabulary() -> Vocabulary:
         raise BiodanceError(f"{path}: groups {', '.join(sorted(raw))}; expected {', '.join(_GROUPS)}.")
     found = {}
     for group in _GROUPS:
-        words = [_word(f"{path}: {group}.{key}", key, raw[group][key]) for key in raw[group]]
+        words = list[Word]()
+        for key, said in raw[group].items():
+            if unknown := set(said) - set(_KEYS):
+                legal = ", ".join(_KEYS)
+                raise BiodanceError(f"{path}: {group}.{key}: unknown key {sorted(unknown)[0]!r}; legal are {legal}.")
+            angles = tuple((joint, float(np.radians(angle))) for joint, angle in said.get("angles", {}).items())
+            flags = {name: bool(said.get(name, False)) for name in _FLAGS}
+            words.append(Word(key, str(said["name"]), angles, str(said.get("mirror", key)), **flags))
         words.sort(key=lambda word: not word.rest)
         keys = [word.key for word in words]
         if [word.rest for word in words] != [True] + [False] * (len(words) - 1):
@@ -129,14 +133,6 @@ def posture_phrases() -> tuple[str, ...]:
     for text in (*texts, _FREE_ARM):
         out += [singular(text.format(side)) if side != "both" else text.format(side) for side in sides]
     return tuple(dict.fromkeys(part for one in (*out, IN_PART) for part in one.split(", ")))
-
-
-def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
-    if unknown := set(raw) - set(_KEYS):
-        raise BiodanceError(f"{where}: unknown key {sorted(unknown)[0]!r}; legal are {', '.join(_KEYS)}.")
-    angles = tuple((joint, float(np.radians(angle))) for joint, angle in raw.get("angles", {}).items())
-    flags = {name: bool(raw.get(name, False)) for name in _FLAGS}
-    return Word(key, str(raw["name"]), angles, str(raw.get("mirror", key)), **flags)
 
 
 def groups_of(stance: Stance) -> dict[str, str]:
@@ -241,19 +237,15 @@ def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
 
 def _within(body: Body, plan: Plan, part: str, word: Word) -> dict[str, float]:
     """Return the angles of all joints of a part, as near to a word as ranges and limits let them be."""
-    angles = dict.fromkeys(_joints_of(body, part), 0.0) | dict(word.angles)
+    side, _, group = part.rpartition("_")
+    names = (joint.name for joint in body.joints)
+    own = (name.removeprefix(f"{side}_") for name in names if not side or name.startswith(f"{side}_"))
+    # what a word does not name is straight, as far as it goes
+    angles = dict.fromkeys((name for name in own if name.startswith(_JOINTS[group])), 0.0) | dict(word.angles)
     near = {own_joint(part, joint): _near(body, part, joint, angle) for joint, angle in angles.items()}
     for limit in plan.limits:
         near = limit.eased(near)
     return {joint: near[own_joint(part, joint)] for joint in angles}
-
-
-def _joints_of(body: Body, part: str) -> tuple[str, ...]:
-    """Return the joints of a part, without its side: what a word does not name is straight, as far as it goes."""
-    side, _, group = part.rpartition("_")
-    names = (joint.name for joint in body.joints)
-    own = (name.removeprefix(f"{side}_") for name in names if not side or name.startswith(f"{side}_"))
-    return tuple(name for name in own if name.startswith(_JOINTS[group]))
 
 
 def _short_of(body: Body, plan: Plan, part: str, word: Word) -> str:
@@ -283,16 +275,13 @@ def singular(text: str) -> str:
     return text
 
 
-_ROUNDS = 5
-"""Corrections of the pelvis; each leaves about a fifth of the error."""
-_BACK = 0.03
-"""m behind the middle of the support where people stand: over the arch of the foot."""
+_ROUNDS = 5  # Corrections of the pelvis; each leaves about a fifth of the error
+_BACK = 0.03  # m behind the middle of the support where people stand: over the arch of the foot
 _GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
 """Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
 _ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
 """rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
-_FROM_STOP = float(np.radians(3.0))
-"""rad that the joints of a holding arm keep from their stops."""
+_FROM_STOP = float(np.radians(3.0))  # rad that the joints of a holding arm keep from their stops
 _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
 
@@ -409,19 +398,15 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
     if stance.seat:
         x[:, 2] = stance.seat
         return x
-    x[:, :2] = middle = _middle(stance)
+    # The point (2,) m over which people stand: behind the middle of the support, or of the foot that bears.
+    along = stance if stance.over is None else stance.on(stance.over)
+    x[:, :2] = middle = np.array([along.centre[0] - _BACK, stance.centre[1]])
     for _ in range(_ROUNDS):
         x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
         x = chain.plant(x, stance.planted, stance.ankle)
         x[:, :2] += middle - chain.mass_centre(x)[:, :2]
     x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
     return chain.plant(x, stance.planted, stance.ankle)
-
-
-def _middle(stance: Stance) -> Array:
-    """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
-    along = stance if stance.over is None else stance.on(stance.over)
-    return np.array([along.centre[0] - _BACK, stance.centre[1]])
 
 
 def nearest_in_words(table: PostureTable, limits: tuple[Limit, ...]) -> str:

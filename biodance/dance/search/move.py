@@ -44,8 +44,7 @@ of the rounds.
 """
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
-_LITTLE = 0.01
-"""s·(rad/s²)², information on every inertia that is supposed before the first move."""
+_LITTLE = 0.01  # s·(rad/s²)², information on every inertia that is supposed before the first move
 HOPELESS = 0.5
 """Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
 without the reserve on the coarse grid.
@@ -156,8 +155,9 @@ class MoveObjective:
 
     def __call__(self, state: State) -> tuple[float, Array]:
         """Return the objective and its slopes by x, v, a."""
-        value, slope = off_centre(state)
-        value, slope = CENTRE * value, CENTRE * slope
+        gap = state.zmp - state.stance.centre
+        value = CENTRE * (100 * float(np.mean(np.sum(gap**2, axis=1))))  # dm²
+        slope = CENTRE * (200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes))
         if self.task.blocks.simplicity:
             hard, by = effort(state)
             value, slope = value + self.task.blocks.simplicity * hard, slope + self.task.blocks.simplicity * by
@@ -179,13 +179,6 @@ class MoveObjective:
 def _logarithm(gram: Array) -> tuple[Array, Array]:
     value, slope = condition(gram)
     return np.log(value), slope / value[..., None, None]
-
-
-def off_centre(state: State) -> tuple[float, Array]:
-    """Return the mean squared distance (dm²) of the ZMP from the middle of the support, and its slopes (3, T, n)."""
-    gap = state.zmp - state.stance.centre
-    slopes = 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes)
-    return 100 * float(np.mean(np.sum(gap**2, axis=1))), slopes
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
@@ -280,19 +273,16 @@ def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move |
     return Move(via, duration, first.gram + second.gram, 0.0, "", stop[None])
 
 
-_SLOWER = (1.0, 1.4, 1.8)
-"""Factors on the duration of a straight move, one after the other."""
+_SLOWER = (1.0, 1.4, 1.8)  # Factors on the duration of a straight move, one after the other
 ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _ITERATIONS = (12, 8)
-_FROM_STOP = 0.08
-"""rad that a lifted leg keeps from the stops of its joints."""
+_FROM_STOP = 0.08  # rad that a lifted leg keeps from the stops of its joints
 _LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
 """rad by which hip, knee and ankle of a lifted leg bend on the way, and by which it goes away from the other one."""
 _SAMPLED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Fractions of a move at which imprecise people must have room, too."""
-_STANDING = 0.2
-"""s of standing still before and after a move that is looked at alone."""
+_STANDING = 0.2  # s of standing still before and after a move that is looked at alone
 
 
 def straight_move(task: Task, stances: tuple[Stance, Stance], enough: float = ENOUGH) -> tuple[Move, float]:
@@ -327,8 +317,14 @@ def other_moves(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
 
 def _vias(task: Task) -> list[Array]:
     """Return the via points (2, n) that are tried: straight on, on one leg also by lifts that are higher or wider."""
-    lifts = _LIFTS if len(task.stance.planted) == 1 else ()
-    return [task.straight(), *(_lifting(task, lift) for lift in lifts)]
+    limits, out = task.chain.body.limits, [task.straight()]
+    for lift in _LIFTS if len(task.stance.planted) == 1 else ():
+        (side,) = {0, 1} - set(task.stance.planted)
+        columns, via = np.array(task.chain.leg_columns[side]), task.straight()
+        low, high = limits.lower[columns - ROOT] + _FROM_STOP, limits.upper[columns - ROOT] - _FROM_STOP
+        via[:, columns] = np.clip(via[:, columns] + lift, np.minimum(low, via[:, columns]), high)
+        out.append(via)
+    return out
 
 
 def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
@@ -347,16 +343,6 @@ def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], e
             if found > AMPLE:
                 break
     return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
-
-
-def _lifting(task: Task, lift: tuple[float, ...]) -> Array:
-    """Return the via points (2, n) of a straight move on which the free leg does the ``lift`` within its ranges."""
-    via, limits = task.straight(), task.chain.body.limits
-    for side in {0, 1} - set(task.stance.planted):
-        columns = np.array(task.chain.leg_columns[side])
-        low, high = limits.lower[columns - ROOT] + _FROM_STOP, limits.upper[columns - ROOT] - _FROM_STOP
-        via[:, columns] = np.clip(via[:, columns] + lift, np.minimum(low, via[:, columns]), high)
-    return via
 
 
 def _round_about(task: Task, best: Move) -> Move:

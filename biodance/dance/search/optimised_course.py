@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import static_grams
+from biodance.dance.problem.excitation import PostureInformation, static_grams, update_posterior
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.search.course import Course, DesignContext, PlainStep, with_exciting_moves
-from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.postures import (
     KEPT,
     Exciting,
@@ -32,8 +31,7 @@ from biodance.dance.search.postures import (
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_METRE = 3.0
-"""rad that a metre of the root counts."""
+_METRE = 3.0  # rad that a metre of the root counts
 _ENDS = (1, 0, 1)
 """Which end of a move that cannot be made is exchanged: where it goes to, comes from, the new one where it goes to."""
 _REST = (0.0, 0.6, 0.15)
@@ -185,7 +183,12 @@ def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[Pl
         course = with_exciting_moves(work, replace(course, moves=known, notes=(*course.notes, *notes)), attempt)
     for k, move in enumerate(course.moves):
         if move is not None and move.limit:
-            raise BiodanceError(_impossible(course, k, move.limit))
+            raise BiodanceError(
+                f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({course.stances[k].name} to "
+                f"{course.stances[k + 1].name}) cannot be made: {move.limit.replace('_', ' ')} is exceeded even "
+                "slowly, by way of a posture in between, and with other postures at its ends. Leave these feet out of "
+                "the protocol, or widen that limit."
+            )
     return course
 
 
@@ -239,12 +242,3 @@ def _changed(course: Course[PlainStep], place: int, what: str, limits: dict[int,
         else f"The posture in between after posture {number}"
     )
     return f"{which} was {what}: a move to or from it would have exceeded the limit on {limit.replace('_', ' ')}."
-
-
-def _impossible(course: Course[PlainStep], k: int, limit: str) -> str:
-    feet = f"{course.stances[k].name} to {course.stances[k + 1].name}"
-    return (
-        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({feet}) cannot be "
-        f"made: {limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
-        "postures at its ends. Leave these feet out of the protocol, or widen that limit."
-    )

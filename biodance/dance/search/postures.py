@@ -229,8 +229,7 @@ FLIP = np.array([1.0, 1.0, -1.0])
 """Sense of the axes of a segment in the image (z to the right)."""
 SIDEWAYS = ("_bending", "_rotation")
 """Ends of the names of middle joints that change their sense; paired ones have the anatomical sense on both sides."""
-_SAME = 1e-9
-"""m, kg, rad, N·m: differences between the sides that are rounding."""
+_SAME = 1e-9  # m, kg, rad, N·m: differences between the sides that are rounding
 
 
 def counterpart(name: str) -> str:

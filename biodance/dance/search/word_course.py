@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.dance import Dance
+from biodance.dance.problem.excitation import PostureInformation, update_posterior
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via
 from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
 from biodance.dance.search.course import Course, DesignContext, move_task
-from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.known_postures import (
     PostureTable,
     Word,
@@ -39,8 +39,7 @@ from biodance.dance.search.move import AMPLE, ENOUGH, Move, Task, straight_move
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_PARTS = 2
-"""Parts of the body that change at a time."""
+_PARTS = 2  # Parts of the body that change at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +152,10 @@ class Reachability:
             found = np.array([key[1]])
             if steps:
                 rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
-                found = np.array([t for t in rows if t in near or any(self._steps(int(k), table, t) for k in near)])
+                here = [WordStep(table, int(k), ()) for k in near]
+                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
             self._around[key] = found
         return self._around[key]
-
-    def _steps(self, s: int, table: PostureTable, t: int) -> bool:
-        return self.link(WordStep(table, s, ()), table, t) is not None
 
     def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
         """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
@@ -191,8 +188,7 @@ def feet_key(stance: Stance) -> str:
 
 LEAST = 2
 """Postures of a dance: between them there is one move."""
-_Blocks = tuple[tuple[str, int], ...]
-"""Feet, and how many postures on them (`Plan.blocks`)."""
+_Blocks = tuple[tuple[str, int], ...]  # Feet, and how many postures on them (`Plan.blocks`)
 
 
 class NoNextPosture(BiodanceError):
@@ -216,9 +212,7 @@ class NoNextPosture(BiodanceError):
             self.reached = 0  # its feet cannot be left, or not be reached
 
     def possible(self, blocks: _Blocks) -> _Blocks:
-        """Return the blocks of a plan without those postures that are not possible; empty where these are no part of
-        it.
-        """
+        """Return the blocks of a plan without postures that are not possible; empty where these are no part of it."""
         shorter = [(name, self.reached if name == self.stance else count) for name, count in blocks]
         return tuple((name, count) for name, count in shorter if count) if tuple(shorter) != blocks else ()
 
@@ -229,18 +223,13 @@ class NoNextPosture(BiodanceError):
         return f"Left out: {out} {self.stance.replace('_', ' ')}; {self.why}."
 
 
-_INSTRUCTION = 0.5
-"""s that one instruction is worth at simplicity 1."""
-_TRIES = 200
-"""Postures that are taken or given up before a search is."""
-_NEXT_TRIED = 5
-"""Postures that are tried after another one before that one is given up."""
+_INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
+_TRIES = 200  # Postures that are taken or given up before a search is
+_NEXT_TRIED = 5  # Postures that are tried after another one before that one is given up
 _AT_ONCE = 12
 """Postures of which one that imprecise people surely can is taken before others that tell more."""
-_LIFTING = 1.4
-"""Times as long as others that a move takes in which a foot is lifted or put down."""
-_LOOKED_AT = 24
-"""Postures that tell most standing still, whose moves are judged, too."""
+_LIFTING = 1.4  # Times as long as others that a move takes in which a foot is lifted or put down
+_LOOKED_AT = 24  # Postures that tell most standing still, whose moves are judged, too
 
 
 @dataclass(eq=False)
@@ -269,7 +258,10 @@ class WordSearch:
 
     def __post_init__(self) -> None:
         plan = self.work.plan
-        self.reachability = Reachability(self.work, self._can)
+        self.reachability = Reachability(
+            self.work,
+            lambda last, step: not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit),
+        )
         self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
 
     def course(self, stances: tuple[Stance, ...]) -> Course[WordStep]:
@@ -311,14 +303,6 @@ class WordSearch:
             if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
-
-    def never_kept(self, course: Course[WordStep]) -> tuple[str, ...]:
-        """Return in sentences the words that a person with own limits can do on none of the feet of a course."""
-        if not self.work.plan.careful:
-            return ()
-        tables = {feet_key(one): self.reachability.table(one) for one in course.stances if one.over is None}
-        found = [words_never_kept(table, self.work.plan.limits) for table in tables.values()]
-        return tuple(sentence for one in found for sentence in one)
 
     def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
         """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
@@ -414,9 +398,6 @@ class WordSearch:
             self._held[step.key] = found, limit if found < self.enough else ""
         return self._held[step.key]
 
-    def _can(self, last: WordStep, step: WordStep) -> bool:
-        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
-
     def move(self, last: WordStep, step: WordStep) -> Move:
         """Return the move from one step to the next, as `straight_move` finds it."""
         return self._judged_move(last, step)[0]
@@ -467,11 +448,11 @@ def word_course(search: WordSearch) -> Course[WordStep]:
             notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
         else:
-            lacking = (
-                *words_left_out(body, plan, course.stances, search.reachability.words),
-                *search.never_kept(course),
-            )
-            return replace(course, notes=tuple(dict.fromkeys((*notes, *lacking))))
+            notes += words_left_out(body, plan, course.stances, search.reachability.words)
+            if plan.careful:  # the words that a person with own limits can do on none of the feet
+                tables = {feet_key(one): search.reachability.table(one) for one in course.stances if one.over is None}
+                notes += (said for one in tables.values() for said in words_never_kept(one, plan.limits))
+            return replace(course, notes=tuple(dict.fromkeys(notes)))
 
 
 def freer_dance(body: Body, plan: Plan, *, seed: int = 0, stances: tuple[Stance, ...] = ()) -> Dance:

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, Interval, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import known_interval
-from biodance.report.figures.vector import Axis, Frame, Stroke, panel, points, segments
+from biodance.report.figures.vector import Axis, Frame, Stroke, panel, points, segments, with_legend
 
 ROW = 19.0
 """px of a segment's row."""
@@ -35,9 +35,7 @@ def mass_figure(found: Identification, paper: Identification | None = None, load
 
 
 def shape_figure(found: Identification, paper: Identification | None = None) -> str:
-    """Return centre of mass (segment axes, from the proximal joint) and inertia about it of every segment, as
-    `mass_figure` draws masses.
-    """
+    """Return centre of mass (segment axes, from the proximal joint) and inertia about it, drawn as by `mass_figure`."""
     drawn = [
         _forest(_quantity(found, name, times), _beside(paper, name, times), title) for name, times, title in _SHAPE
     ]
@@ -67,17 +65,16 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
             (at - 0.17, row.after, edge, _INSIDE[row.known], 1.8),
         ):
             marks.append(segments(x, y, np.array([[low, up], [high, up]]), Stroke(colour, "", wide)))
-            marks.append(points(x, y, np.array([value]), np.array([up]), Stroke(colour), inside=inside, size=6.5))
+            marks.append(points(x, y, value, up, Stroke(colour), inside=inside, size=6.5))
         if load is not None and row.name == load[0]:
             ends = np.array([[row.after[0] - load[1], at - 0.4], [row.after[0], at - 0.4]])
             marks.append(segments(x, y, ends, Stroke(PINK, "", 2.4)))
         if row.name in beside:
-            marks.append(points(x, y, np.array([beside[row.name]]), np.array([at]), Stroke(BLUE)))
+            marks.append(points(x, y, beside[row.name], at, Stroke(BLUE)))
     frame = Frame(height=ROW * len(rows), left=112.0, above=4.0)
     return panel(x, y, marks, f"{label.partition(',')[0]} of every segment, table and identified", frame=frame)
 
 
 def _with_legend(drawn: Sequence[str], paper: Identification | None, load: _Load) -> str:
     more = {"blue point: the paper's programme": paper is not None, "pink: load": load is not None}
-    legend = "".join(f"<span>{word}</span>" for word in (*_WORDS, *(word for word, there in more.items() if there)))
-    return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'
+    return with_legend((*_WORDS, *(word for word, there in more.items() if there)), drawn)

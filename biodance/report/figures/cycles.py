@@ -78,7 +78,11 @@ def repetitions_figure(
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
             usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
-            theirs = [_of_file(one) for one in found.file_groups if one.quantity == quantity]
+            theirs = [
+                Curve(f"{one.side}, plug-in gait", one.mean, Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
+                for one in found.file_groups
+                if one.quantity == quantity
+            ]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
             cells.append(
                 [Strip(curve_title(same[0]), [*usual, *_curves(same), *theirs], least=least, rules=_offs(found))]
@@ -88,10 +92,6 @@ def repetitions_figure(
     people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
     band = f"one sd between cycles{people}"
     return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
-
-
-def _of_file(one: CurveGroup) -> Curve:
-    return Curve(f"{one.side}, plug-in gait", one.mean, Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
 
 
 def _offs(found: Repetitions) -> list[tuple[float, Stroke]]:

@@ -2,37 +2,33 @@
 expected accuracy; and the film of one that is played in MuJoCo, as .gif, or as .mp4 where ffmpeg is installed.
 """
 
+import shutil
+import subprocess
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.dance.playback import Rehearsal
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, spaced
+from biodance.errors import BiodanceError, MissingLibrary
+from biodance.lab.plain_text import whole_file
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines, silhouettes
 from biodance.records import Array, side_in_name
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
+from biodance.report.files import refuse_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from PIL.Image import Image
 
     from biodance.dance.expectation import Expectation
     from biodance.dance.verify import ZmpPath
-import shutil
-import subprocess
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from biodance.dance.playback import Rehearsal
-from biodance.errors import BiodanceError, MissingLibrary
-from biodance.lab.plain_text import whole_file
-from biodance.report.files import refuse_file
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 
 _COLUMNS = 10
@@ -81,9 +77,7 @@ def criterion_figure(values: Array, bound: float) -> "Figure":
 
 
 def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
-    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance;
-    a column a stance.
-    """
+    """Draw the zero-moment point of every move: below on the straight way, above in the dance; a column a stance."""
     names = list(dict.fromkeys(path.stance.name for path in paths))
     with look():
         drawn = figure(4.0)
@@ -115,9 +109,7 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
 
 
 def expectation_figure(expectation: "Expectation") -> "Figure":
-    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of
-    the table's.
-    """
+    """Draw the expected standard deviations of mass and centre of mass by duration, as shares of the table's."""
     kinds = [name.removeprefix("right_") for name in expectation.segments if not name.startswith("left_")]
     colours = (BLACK, ORANGE, SKY, GREEN, BLUE, RED, PINK, GREY)
     with look():
@@ -132,13 +124,8 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
                 ]
                 share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
                 style = ("-", "--", ":")[number // len(colours) % 3]
-                axes.plot(
-                    expectation.duration,
-                    share,
-                    style,
-                    color=colours[number % len(colours)],
-                    label=spaced(kind),
-                )
+                colour = colours[number % len(colours)]
+                axes.plot(expectation.duration, share, style, color=colour, label=spaced(kind))
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")
         drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(kinds), 4))
@@ -149,21 +136,15 @@ def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) 
     axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linestyle=style, linewidth=0.9, label=label)
 
 
-_RATE = 25.0
-"""Pictures per second."""
-_SIZE, _FLOOR = (290, 480), 450
-"""Of one view, px; row of the floor."""
-_SCALE = 170.0
-"""px per metre of a person's height."""
-_TALL = 1.75
-"""m: bodies are drawn as large as if they were so tall."""
+_RATE = 25.0  # Pictures per second
+_SIZE, _FLOOR = (290, 480), 450  # Of one view, px; row of the floor
+_SCALE = 170.0  # px per metre of a person's height
+_TALL = 1.75  # m: bodies are drawn as large as if they were so tall
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Title and horizontal direction of the eye."""
-_FINE = 2
-"""Times as fine a picture is drawn before it is made smaller, so that edges are smooth."""
+_FINE = 2  # Times as fine a picture is drawn before it is made smaller, so that edges are smooth
 _INK = {"right": (0, 114, 178), "left": (213, 94, 0), "middle": (110, 120, 130)}
-_PALE = 0.55
-"""Share of white in the colours of the plan."""
+_PALE = 0.55  # Share of white in the colours of the plan
 _FORMATS = (".gif", ".mp4")
 
 
@@ -211,18 +192,8 @@ def _write(frames: "list[Image]", part: Path, out: Path) -> None:
         small = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
         small[0].save(part, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
         return
-    words = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += [
-        "-s",
-        f"{frames[0].width}x{frames[0].height}",
-        "-r",
-        str(_RATE),
-        "-i",
-        "-",
-        "-pix_fmt",
-        "yuv420p",
-        str(part),
-    ]
+    size, form = f"{frames[0].width}x{frames[0].height}", "-y -loglevel error -f rawvideo -pix_fmt rgb24"
+    words = ["ffmpeg", *f"{form} -s {size} -r {_RATE} -i - -pix_fmt yuv420p".split(), str(part)]
     done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
     if done.returncode:
         raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")

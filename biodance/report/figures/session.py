@@ -31,6 +31,7 @@ from biodance.report.figures.vector import (
     points,
     rule,
     segments,
+    with_legend,
 )
 from biodance.report.wording import format_number, millimetres
 
@@ -58,8 +59,7 @@ def marker_figure(fit: MarkerFit) -> str:
     return bar_list(rows, "Distance of every marker to the model, RMS, the worst first")
 
 
-_AROUND = 200.0
-"""mm that the wide view shows around the feet."""
+_AROUND = 200.0  # mm that the wide view shows around the feet
 _SQUARE = Frame(width=390.0, height=240.0, left=48.0)
 
 
@@ -125,14 +125,11 @@ def standing_figure(standing: QuietStanding) -> str:
     words = ["black point: centre of pressure (plates)"]
     words += ["green ring: centre of mass (table)"] if tracked else []
     words += ["blue points: right foot's markers", "orange rings: left foot's"]
-    legend = "".join(f"<span>{word}</span>" for word in words)
-    return f'<div class="legend">{legend}</div><div class="cells">{wide}{near}</div>'
+    return with_legend(words, (wide, near))
 
 
 def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: NDArray[np.bool_]) -> list[list[Strip]]:
-    """Return for each channel its curves (measured first) over the differences measured minus curve; forces left,
-    moments right.
-    """
+    """Return for each channel its curves, measured first, over measured minus curve; forces left, moments right."""
     cells = []
     for channel in (0, 3, 1, 4, 2, 5):
         title, least = CHANNEL_TITLES[channel], _LEAST[channel]

@@ -19,8 +19,7 @@ from biodance.display import BLACK, GREEN
 from biodance.pipeline.trial_result import Still
 from biodance.report.figures.style import SIDE_COLOURS
 
-_PATIENCE = 60.0
-"""Seconds after which the child is given up."""
+_PATIENCE = 60.0  # Seconds after which the child is given up
 
 TILE, _COLUMNS = (300, 420), 6
 """Size of one posture in a sheet of postures, px, and how many stand beside each other."""

@@ -55,9 +55,7 @@ def figure(height: float) -> "Figure":
 
 
 def svg_address(drawn: "Figure") -> str:
-    """Return ``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same
-    characters.
-    """
+    """Return ``drawn`` as an image's address (``data:image/svg+xml``): the same figure gives the same characters."""
     stream = BytesIO()
     with look():
         drawn.savefig(stream, format="svg", metadata={"Date": None})

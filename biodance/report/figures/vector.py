@@ -21,8 +21,7 @@ STEPS = 4000
 """Steps along each axis of a plot: a value is read to 1/4000 of what the axis spans."""
 _PLACES = 360
 """Places along a curve that are told apart: of longer ones each place shows the lowest and the highest value."""
-_FAR = 8 * STEPS
-"""Steps beyond which a value outside the axes is cut."""
+_FAR = 8 * STEPS  # Steps beyond which a value outside the axes is cut
 
 
 @dataclass(frozen=True)
@@ -162,8 +161,11 @@ def rule(axis: Axis, value: float, *, upright: bool, look: Stroke = Stroke(GREY,
     return f'<path class="rule" {look.attributes} d="{d}"/>'
 
 
-def points(x: Axis, y: Axis, across: Array, up: Array, look: Stroke, *, size: float = 6.0, inside: str = "") -> str:
-    """Return round points of ``size`` px at (n,) places, filled with ``inside`` ("" = the look's colour)."""
+def points(
+    x: Axis, y: Axis, across: Array | float, up: Array | float, look: Stroke, *, size: float = 6.0, inside: str = ""
+) -> str:
+    """Return round points of ``size`` px at one or (n,) places, filled with ``inside`` ("" = the look's colour)."""
+    across, up = np.atleast_1d(across, up)
     finite = np.isfinite(across) & np.isfinite(up)
     if not finite.any():
         return ""
@@ -228,12 +230,9 @@ def panel(x: Axis, y: Axis, marks: Iterable[str], about: str, *, frame: Frame = 
     )
 
 
-_MUCH = 0.7
-"""Share of used frames below which a figure begins with these."""
-_NARROW, _TALL = 46.0, 110.0
-"""px of the height of a difference and of a curve."""
-_THREE = 300.0
-"""px of width below which three panels stand beside each other."""
+_MUCH = 0.7  # Share of used frames below which a figure begins with these
+_NARROW, _TALL = 46.0, 110.0  # px of the height of a difference and of a curve
+_THREE = 300.0  # px of width below which three panels stand beside each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,22 +307,15 @@ class CurveFigure:
         shades += [shade(x, float(self.time[a]), float(self.time[b - 1]), kind="filled") for a, b in filled]
         cells = "".join(f'<div class="cell">{self._cell(x, strips, shades)}</div>' for strips in self.cells)
         trial = f' data-trial="{escape(self.trial)}"' if self.trial else ""
-        trial += self._first_view(x)
+        if self.used is not None and 0 < self.used.mean() < _MUCH:  # where much is left out, the rest is seen first
+            first, last = x.steps(self.time[np.flatnonzero(self.used)[[0, -1]]]).tolist()
+            room = max((last - first) // 4, STEPS // 100)
+            trial += f' data-view="{max(0, first - room)} {min(STEPS, last + room)}"'
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
             f'<div class="legend">{self._legend(bool(left_out), bool(filled))}</div><p class="reading"></p>'
             f'<div class="cells{" three" * (self.width < _THREE)}">{cells}</div></div>'
         )
-
-    def _first_view(self, x: Axis) -> str:
-        """Return the steps that are seen first, as an attribute: where much is left out, the rest with its
-        surroundings; "" for all.
-        """
-        if self.used is None or not 0 < self.used.mean() < _MUCH:
-            return ""
-        first, last = x.steps(self.time[np.flatnonzero(self.used)[[0, -1]]]).tolist()
-        room = max((last - first) // 4, STEPS // 100)
-        return f' data-view="{max(0, first - room)} {min(STEPS, last + room)}"'
 
     def _cell(self, x: Axis, strips: Sequence[Strip], shades: list[str]) -> str:
         out = []
@@ -352,6 +344,12 @@ class CurveFigure:
         grey = '<span><i class="swatch out"></i>left out: not fully measured</span>' if left_out else ""
         grey += '<span><i class="swatch filled"></i>filled: markers put into a gap</span>' if filled else ""
         return buttons + (f'<span><i class="swatch in"></i>{escape(self.band)}</span>' if banded else "") + grey
+
+
+def with_legend(words: Iterable[str], panels: Iterable[str]) -> str:
+    """Return panels beside each other below a legend of ``words``."""
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{"".join(panels)}</div>'
 
 
 def swatch(look: Stroke) -> str:

@@ -58,9 +58,7 @@ from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
-    """Return measured minus simulated wrench of the first kept trial in six channels: with the body in use, and with
-    the findings.
-    """
+    """Return measured minus simulated wrench of the first kept trial, six channels: as it is, and with the findings."""
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     time = np.arange(len(before)) / rate
@@ -125,7 +123,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     for i, name in enumerate(order):
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
         marks.append(segments(x, y, np.array([[value.min(), i], [value.max(), i]]), Stroke(GREY, "", 2.5)))
-        marks.append(points(x, y, np.array([np.median(value)]), np.array([float(i)]), Stroke(BLUE)))
+        marks.append(points(x, y, np.median(value), i, Stroke(BLUE)))
     about = "per kind of cause the smallest size that this session would have seen"
     drawn = panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
     return f'<div class="single">{drawn}</div>'
@@ -139,8 +137,7 @@ def estimated(one: Estimate) -> str:
     return f"{sized(one.value, one.unit)} (95 % interval {sized(low, one.unit)} to {sized(high, one.unit)})"
 
 
-_CERTAIN = 14.0
-"""Natural logarithm of a million: above it odds are no longer printed."""
+_CERTAIN = 14.0  # Natural logarithm of a million: above it odds are no longer printed
 
 
 def odds(log_bayes_factor: float) -> str:

@@ -23,8 +23,7 @@ from biodance.pipeline.dance import not_safe
 from biodance.pipeline.still import parent_segments
 from biodance.records import SIDES, Array, side_in_name
 from biodance.report.files import refuse_page, write_files
-from biodance.report.pages.dance_words import script_words
-from biodance.report.pages.language import ENGLISH, Language, read_language
+from biodance.report.pages.language import ENGLISH, Language, read_language, script_words
 from biodance.report.pages.template import render, script_json, template_text, three_js
 from biodance.report.tables.schema import Schema
 from biodance.version import __version__
@@ -109,12 +108,9 @@ def _points(body: Body) -> list[dict[str, Any]]:
     ]
 
 
-_RATE = 15.0
-"""Hz of the poses; the page turns and shifts evenly between two."""
-_SQUARE = (0.6, 0.6)
-"""m that is drawn where the plate is not known."""
-_FACTOR = 1e4
-"""Steps a metre: positions are whole numbers of 0.1 mm."""
+_RATE = 15.0  # Hz of the poses; the page turns and shifts evenly between two
+_SQUARE = (0.6, 0.6)  # m that is drawn where the plate is not known
+_FACTOR = 1e4  # Steps a metre: positions are whole numbers of 0.1 mm
 
 
 def scene_of(dance: Dance, say: Say = in_english) -> dict[str, Any]:

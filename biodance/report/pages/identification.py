@@ -33,6 +33,7 @@ from biodance.report.figures.vector import (
     rule,
     segments,
     shade,
+    with_legend,
 )
 from biodance.report.pages.template import render
 from biodance.report.tables.identification import (
@@ -74,7 +75,7 @@ def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference
             look = Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
             marks.append(segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
             inside = "" if row.known else "#fff"
-            marks.append(points(x, y, np.array([factor * row.value]), np.array([at]), look, inside=inside))
+            marks.append(points(x, y, factor * row.value, at, look, inside=inside))
         drawn.append(panel(x, y, marks, title, frame=Frame(height=17.0 * len(names), left=112.0, above=4.0)))
     return f'<div class="cells">{"".join(drawn)}</div>'
 
@@ -88,8 +89,7 @@ def excitation_figure(found: "PerformanceScore") -> str:
     return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
 
 
-_RANKED = 15
-"""Quantities that the figure of pulls and impacts shows."""
+_RANKED = 15  # Quantities that the figure of pulls and impacts shows
 
 
 def impact_figure(found: Sequence[Impact]) -> str:
@@ -107,21 +107,16 @@ def impact_figure(found: Sequence[Impact]) -> str:
     right = []
     for (at, _), row in zip(ticks, rows, strict=True):
         ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
-        left += [segments(pulled, y, ends, Stroke(BLACK)), _point(pulled, y, row.pull, at, Stroke(BLACK))]
+        left += [segments(pulled, y, ends, Stroke(BLACK)), points(pulled, y, row.pull, at, Stroke(BLACK))]
         knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
         right += [segments(moment, y, knee, Stroke(GREEN, "", 2.0)), segments(moment, y, hip, Stroke(PINK, "4 2", 2.0))]
-        right += [_point(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
-        right += [_point(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
+        right += [points(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
+        right += [points(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
     frame = Frame(height=ROW * len(rows), left=138.0, above=4.0)
-    drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
-    drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
+    pulls = panel(pulled, y, left, "pull of every quantity", frame=frame)
+    impacts = panel(moment, y, right, "impact on knee and hip", frame=frame)
     words = ("grey: one prior standard deviation", "green point: knee flexion", "pink ring: hip flexion")
-    legend = "".join(f"<span>{word}</span>" for word in words)
-    return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
-
-
-def _point(x: Axis, y: Axis, across: float, up: float, look: Stroke, *, inside: str = "") -> str:
-    return points(x, y, np.array([across]), np.array([up]), look, inside=inside)
+    return with_legend(words, (pulls, impacts))
 
 
 _SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
@@ -170,11 +165,6 @@ LISTED = "Cannot be known"
 _SCHEMAS = {"segment": SEGMENT_ROW, "torque": TORQUE_ROW, "suspect": SUSPECT_ROW, "difference": DIFFERENCE_ROW}
 
 
-def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
-    rows = DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
-    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
-
-
 _METHODS = Schema(
     "segment table posterior paper",
     shown="segment: {segment:name} | table (kg): {table[0]:2} | posterior (kg): {posterior[0]:2} | paper (kg): "
@@ -208,6 +198,11 @@ def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tu
     every = (*found.posterior.validations, *found.posterior.fitted)
     same = [("posterior", other.identified_agreement) for other in every if other.name == trial.name]
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
+
+
+def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
+    rows = DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
+    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
 
 
 def identification_section(found: SessionIdentification) -> str:

@@ -83,11 +83,6 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
     }
 
 
-def replay_scripts() -> list[str]:
-    """Return the scripts that the replay needs, the library first."""
-    return [three_js(), template_text("replay.js")]
-
-
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
 
@@ -246,7 +241,7 @@ def page(
         "page.html.j2",
         filters={"place": place_words, "apart": _apart},
         schemas={"gap": GAP_ROW},
-        scripts=[template_text("curves.js"), *(replay_scripts() if replay else ())],
+        scripts=[template_text("curves.js"), *((three_js(), template_text("replay.js")) if replay else ())],
         replay=Markup(replay_data(replay)) if replay else "",
         loaded=bool(replay and replay.load),
         sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),

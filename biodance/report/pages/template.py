@@ -1,6 +1,4 @@
-"""How a template becomes a page: one environment, one style, and scripts that the page's own policy allows by their
-hash.
-"""
+"""How a template becomes a page: one environment, one style, scripts that the page's policy allows by their hash."""
 
 import functools
 import json
@@ -68,8 +66,7 @@ def packed_numbers(values: Array) -> str:
     return b64encode(whole.tobytes()).decode("ascii")
 
 
-_UNKNOWN = -32768
-"""Whole number of a place that is not known."""
+_UNKNOWN = -32768  # Whole number of a place that is not known
 
 
 def template_text(name: str) -> str:
@@ -102,8 +99,7 @@ def html_table(
     )
 
 
-_NUMBER = re.compile(r"[±+−–<]? ?\d|–$")
-"""How a cell begins that is a number, or one that is not known."""
+_NUMBER = re.compile(r"[±+−–<]? ?\d|–$")  # How a cell begins that is a number, or one that is not known
 
 
 def render(

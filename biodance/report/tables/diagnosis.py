@@ -9,10 +9,42 @@ from biodance.diagnosis.diagnosis import Estimate
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import spaced
+from biodance.effects import Cause, DiscreteEffect
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.report.tables.schema import Row, Schema
+from biodance.virtual_lab.causes import CAUSES
+
+_PARAMETER = Schema("name unit typical")
+CAUSE_ROW = Schema(
+    "effect=name what=about.what",
+    {
+        "parameters": lambda one: [] if isinstance(one, DiscreteEffect) else _PARAMETER.rows(one.parameters),
+        "can_be_simulated": lambda one: one.name in CAUSES,
+    },
+    "effect: {effect} | parameters: {told} | simulate: {simulated} | what it is: {what}",
+)
+
+
+def causes_document(causes: Iterable[Cause]) -> list[Row]:
+    """Return every cause: its name, parameters with unit and typical size ([] = it is there or not), what it is, and
+    whether ``biodance simulate --effect`` can hide it.
+    """
+    return CAUSE_ROW.rows(causes)
+
+
+def causes_shown(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows with what people see of parameters."""
+    return [
+        row
+        | {
+            "told": ", ".join(f"{one['name']} ({one['unit']})" for one in row["parameters"]) or "–",
+            "simulated": "yes" if row["can_be_simulated"] else "no",
+        }
+        for row in rows
+    ]
+
 
 ATTENTION_ROW = Schema("level text trial about")
 """What a person must see, strongest first."""
@@ -166,8 +198,7 @@ _FORESIGHT = Schema(
 
 FIRST = 5
 """Changes that are told first."""
-_LEARNED = 0.9
-"""Times the table's standard deviation of a mass: less is left of what a dance teaches."""
+_LEARNED = 0.9  # Times the table's standard deviation of a mass: less is left of what a dance teaches
 
 
 def seen_causes(found: Row) -> list[tuple[str, str]]:

@@ -141,9 +141,7 @@ def session_tables(
 
 
 def _joined(parts: Iterable["DataFrame | None"], columns: Sequence[str] = ("trial", "time_s")) -> "DataFrame":
-    """Return the tables of several trials below each other, with ``columns`` at least; columns that one lacks are empty
-    there.
-    """
+    """Return several trials' tables below each other, with ``columns`` at least; what one lacks is empty there."""
     import pandas as pd
 
     some = [part for part in parts if part is not None]

@@ -55,14 +55,6 @@ def information_share(rows: Sequence[Known]) -> float:
     return float(np.mean([row.from_data for row in rows if row.quantity in ASKED]))
 
 
-def prior_source(found: Identification, name: str) -> str:
-    """Return where the prior mass of a segment comes from: "table", "table and girths (knee) and scan"."""
-    said = found.body.girths.get(name, ())
-    shapes = [word for word in said if word in ("foot outline", "scan")]
-    girths = spaced(", ".join(word for word in said if word not in shapes))
-    return " and ".join(["table", *([f"girths ({girths})"] if girths else []), *shapes])
-
-
 def _each(attribute: str, first: int, last: int) -> str:
     """Return the places of an attribute in some of a segment's ten quantities."""
     return ",".join(f"{k}.{attribute}" for k in range(first, last + 1))
@@ -89,10 +81,15 @@ def segments_document(found: Identification) -> list[Row]:
     """Return a row for each segment; none after a failed fit."""
     if found.status != "solved":
         return []
-    return [
-        SEGMENT_ROW.row(segment_rows(found, name)) | {"mass_prior_source": prior_source(found, name)}
-        for name in found.sip.segments
-    ]
+    rows = []
+    for name in found.sip.segments:
+        said = found.body.girths.get(name, ())
+        shapes = [word for word in said if word in ("foot outline", "scan")]
+        girths = spaced(", ".join(word for word in said if word not in shapes))
+        # where the prior mass comes from: "table", "table and girths (knee) and scan"
+        source = " and ".join(["table", *([f"girths ({girths})"] if girths else []), *shapes])
+        rows.append(SEGMENT_ROW.row(segment_rows(found, name)) | {"mass_prior_source": source})
+    return rows
 
 
 _LOAD = Schema(

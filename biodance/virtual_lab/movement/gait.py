@@ -31,8 +31,7 @@ HEEL, TOE = -0.27, 0.73
 _ROLL = {0.0: -0.19, 0.07: -0.03, 0.2: 0.16, 0.45: 0.36, 0.86: 0.62, 1.0: 0.70}
 """Where the centre of pressure is at shares of the stance, in lengths of the sole from the ankle: fast over the heel,
 slow under the ball (medians of 45 recorded steps, docs/benchmarks/diagnosis.md, between them smooth)."""
-_UNDER = 0.37
-"""The same where it is under the body, half-way through the stance."""
+_UNDER = 0.37  # The same where it is under the body, half-way through the stance
 _LANDS, _STOPPED, _LIGHT = 0.3, 0.022, (0.15, 0.03)
 """m/s at which a heel comes down; s in which its pad stops it; share of the vertical force that is there after so many
 s: ground and heel meet at one instant, which force and marker both show (within 5 ms in 42 recorded steps)."""
@@ -181,13 +180,11 @@ _SPIN, _PLACE = 1e-3, 1e-6
 """N·m·s and m: a stride is settled when angular momentum and centre of mass are this close to the forces' own."""
 _SHORT = 1e-3
 """m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
-_PAD = 12
-"""Nodes of the strides before and after with which a stride's derivatives are taken."""
+_PAD = 12  # Nodes of the strides before and after with which a stride's derivatives are taken
 _LATERAL = np.array([0.0, -1.0, 0.0])
 _TURNS = np.array([0.022, 0.022, 0.005])
 """Of mass times stature squared: about how much turns with the pelvis, per axis of the belt."""
-_STATURE = 1.75
-"""m of the person whose gait is described by `GAITS`; others go in proportion."""
+_STATURE = 1.75  # m of the person whose gait is described by `GAITS`; others go in proportion
 
 
 @dataclass(frozen=True, eq=False)

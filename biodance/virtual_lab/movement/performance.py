@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import gaussian_filter1d
+from scipy.linalg import solve_banded
+from scipy.ndimage import correlate1d, gaussian_filter1d
 from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
@@ -24,6 +25,7 @@ from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, Role, Wrench, freeze
 from biodance.virtual_lab.movement.posing import (
     COLUMNS,
+    LEGS_APART,
     RAISED,
     SHIFT,
     WIDTH,
@@ -35,13 +37,14 @@ from biodance.virtual_lab.movement.posing import (
     choreograph,
     leg_tops,
     pelvis_height,
+    sit,
     stand_on_feet,
+    take_seat,
     take_stance,
     turn_about,
     upper_body,
 )
 from biodance.virtual_lab.movement.protocol import TrialPlan
-from biodance.virtual_lab.movement.sitting import LEGS_APART, sit, take_seat
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, smooth_noise, stream
 
@@ -49,8 +52,7 @@ NODE_RATE = 100.0
 """Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""
 MARGIN = 0.1
 """s of motion before and after the recording, for late force samples."""
-_ROUNDS = 12
-"""Largest number of balance corrections; 5 to 8 suffice."""
+_ROUNDS = 12  # Largest number of balance corrections; 5 to 8 suffice
 SETTLED = 0.004
 """m: the balance is settled when the zero-moment point is everywhere this close to the place wanted."""
 
@@ -83,8 +85,6 @@ class Performance:
 
     @cached_property
     def _wrench_spline(self) -> Any:
-        from scipy.interpolate import make_interp_spline
-
         time = np.arange(self.node_time[0], self.node_time[-1] + 1e-9, 0.5 / NODE_RATE)
         time = time[time <= self.node_time[-1]]
         needed = true_wrench(self.person, self.motion(time)).value
@@ -177,24 +177,14 @@ def keep_balance(
         if np.abs(error).max() < SETTLED:
             break
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
-        from scipy.ndimage import correlate1d
-
-        xy = xy - 0.95 * np.asarray(
-            correlate1d(
-                _pendulum(error, pendulum, 1.0 / NODE_RATE),
-                np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0,
-                axis=0,
-                mode="nearest",
-            )
-        )
+        moved, smooth = _pendulum(error, pendulum, 1.0 / NODE_RATE), np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0
+        xy = xy - 0.95 * np.asarray(correlate1d(moved, smooth, axis=0, mode="nearest"))
         q = stand_on_feet(person, pose, curves, stance, xy, height=height)
     return q, float(np.abs(error).max())
 
 
 def _pendulum(right: Array, h: Array, step: float) -> Array:
     """Solve d - h d'' = right (T, 2) for d with d' = 0 at both ends; ``h`` (T,) s², ``step`` s."""
-    from scipy.linalg import solve_banded
-
     k = h / step**2
     bands = np.stack([np.roll(-k, 1), 1 + 2 * k, np.roll(-k, -1)])
     bands[0, 1], bands[2, -2] = -2 * k[0], -2 * k[-1]
@@ -203,8 +193,6 @@ def _pendulum(right: Array, h: Array, step: float) -> Array:
 
 def _splines(time: Array, q: Array) -> tuple[Any, Any, Any]:
     """Return the quintic spline through q and its first two derivatives."""
-    from scipy.interpolate import make_interp_spline
-
     spline = make_interp_spline(time, q, k=5)
     return spline, spline.derivative(1), spline.derivative(2)
 

@@ -1,5 +1,5 @@
-"""Findings that session.toml can correct: what would be written, and what it changes, in a process of its own:
-``python -m biodance.app.correction SESSION FINDINGS`` prints it as JSON. Nothing of the session is touched.
+"""What a window computes in a process of its own and prints as JSON: ``python -m biodance.app.tasks TASK ARGUMENTS``.
+Nothing of a session is touched.
 """
 
 import json
@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.edits import KeyChange, changed_text
-from biodance.app.residuals import residual_rows
+from biodance.cycles.cut import gait_cycles, is_left_out, replaced_events
+from biodance.cycles.strides import STRIDE_UNITS, mean_values, strides
 from biodance.effects import SessionEntry
 from biodance.effects.labels_swapped import exchanges
 from biodance.errors import BiodanceError
@@ -20,11 +21,35 @@ from biodance.lab.session.entries import plate_channels
 from biodance.lab.session.file import FILES, read_session_file
 from biodance.lab.session.read import read_session
 from biodance.library import parse_json
+from biodance.motion.kinematics import centre_of_mass
+from biodance.motion.soles import soles_from_body
+from biodance.pipeline.accepted import CORRECTED
 from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import read_kept
 from biodance.pipeline.session import examine
-from biodance.records import Trial
+from biodance.records import FootEvent, Trial
 from biodance.report.tables.schema import plain_values
+
+
+def residual_rows(before: SessionResult, after: SessionResult) -> list[dict[str, Any]]:
+    """Return by ``trial`` the RMS of a session ``before`` and ``after`` a correction, each a list: the six channels of
+    measured less simulated wrench (N, N·m; the table's body), and the distance of the markers from the body (mm); None
+    = not known.
+    """
+    rows, later = _rms(before), _rms(after)
+    return [{"trial": name, "before": rms, "after": later[name]} for name, rms in rows.items() if name in later]
+
+
+def _rms(result: SessionResult) -> dict[str, list[float | None]]:
+    found: dict[str, list[float | None]] = {}
+    for one in result.trials:
+        compared = one.comparison is not None and one.comparison.used.any()
+        wrench = one.comparison.rms.tolist() if compared and one.comparison else [None] * 6
+        if compared or one.fit:
+            found[one.name] = [*wrench, 1000 * one.fit.total_rms if one.fit else None]
+    return found
+
 
 _Finding = Mapping[str, Any]
 
@@ -132,9 +157,69 @@ def _as_changed(folder: Path, changes: Sequence[KeyChange]) -> Iterator[Path]:
         yield other
 
 
+_OF_MASSES = ("margin_aside", "margin_ahead", "vertical_stiffness")
+"""Values that rest on masses: the body that is kept has identified ones, the last run's values those of the table."""
+
+
+def stride_rows(results: Path, session: Path, trial: str, stem: str) -> list[dict[str, Any]]:
+    """Return the spatio-temporal values of a ``trial`` (file ``stem``), but `_OF_MASSES`, by ``quantity``, ``unit`` and
+    ``side``: ``before``, the mean of the last run, in ``results``, and ``after`` over ``count`` strides, with the
+    events and the spans left out that the session.toml of the ``session`` says now; None = no value.
+
+    Raises
+    ------
+    BiodanceError
+        The last run gave no motion of the trial, or found the events of a foot by hand that session.toml says no more.
+    """
+    document = parse_json((results / "results.json").read_text(encoding="utf-8"))
+    moved = [one for one in (document["movement"] or {"trials": []})["trials"] if one["trial"] == trial]
+    kept = read_kept(results)
+    if not moved or trial not in kept.motions:
+        raise BiodanceError(f"Trial {trial}: the last run gave no motion of it. Run the session again.")
+    told = read_session_file(session).parts(stem)
+    found = tuple(FootEvent(e["time_s"], e["side"], e["down"], e["source"]) for e in moved[0]["events"])
+    gone = {one.side for one in found if one.source == "hand"} - {one.side for one in told.events}
+    if gone:
+        raise BiodanceError(
+            f"Trial {trial}: in the last run the events of the {' and '.join(sorted(gone))} foot were set by hand, and "
+            f"now they are not. Run the session again to have them found."
+        )
+    motion, events = kept.motions[trial], replaced_events(found, told.events)
+    cycles = [one for one in gait_cycles(trial, events) if not is_left_out(one, told.left_out)]
+    soles, centre = soles_from_body(kept.body, motion), centre_of_mass(kept.body, motion)
+    some = strides(cycles, events, kept.body, soles, centre)
+    before = {(one["quantity"], one["side"]): one["mean"] for one in moved[0]["spatiotemporal"]}
+    after = {side: mean_values(some, side) for side in ("left", "right")}
+    return [
+        {"quantity": name, "unit": unit, "side": side, "before": before.get((name, side))}
+        | dict(zip(("after", "sd", "count"), after[side].get(name, (None, None, 0)), strict=True))
+        for name, unit in STRIDE_UNITS.items()
+        if name not in _OF_MASSES
+        for side in ("left", "right")
+        if (name, side) in before or name in after[side]
+    ]
+
+
+def _residuals(session: str, accepted: str) -> list[dict[str, Any]]:
+    """Return the rows of a session and of its copy in what acceptance wrote; none without a copy."""
+    corrected = Path(accepted) / CORRECTED
+    if not corrected.is_dir():
+        return []
+    before, after = (examine(read_session(folder)) for folder in (Path(session), corrected))
+    return residual_rows(before, after)
+
+
+TASKS: Mapping[str, Callable[..., Any]] = {
+    "residuals": _residuals,
+    "correction": lambda session, findings: proposed_correction(Path(session), parse_json(findings)),
+    "strides": lambda results, session, trial, stem: stride_rows(Path(results), Path(session), trial, stem),
+}
+"""What can be asked for, by name, with its arguments as texts."""
+
+
 if __name__ == "__main__":
     try:
-        told = proposed_correction(Path(sys.argv[1]), parse_json(sys.argv[2]))
+        told = TASKS[sys.argv[1]](*sys.argv[2:])
     except BiodanceError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(2)
