@@ -197,12 +197,25 @@ def _told(sentence: str, status: int) -> JSONResponse:
 def serve_window(
     folder: Path, out: Path, *, port: int = 0, opened: bool = True, tell: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Serve a window over the sessions of a ``folder`` (an archive, or one session), with results in ``out``, until
-    Ctrl-C.
+    """Serve a window over the sessions of a ``folder``, with results in ``out``, until Ctrl-C.
 
-    ``port`` of 127.0.0.1, 0 takes a free one; ``opened`` whether the browser is asked to show it; ``tell`` is called
-    with the address, once it answers. BiodanceError where there is no session, or the results' folder or the port is
-    taken.
+    Parameters
+    ----------
+    folder : pathlib.Path
+        An archive, or one session.
+    out : pathlib.Path
+        Of the results, as `run_batch` writes them.
+    port : int
+        Of 127.0.0.1; 0 takes a free one.
+    opened : bool
+        Whether the browser is asked to show it.
+    tell : callable
+        Called with the address, once it answers.
+
+    Raises
+    ------
+    BiodanceError
+        There is no session, the results' folder is taken, or the port.
     """
     archive = Archive(folder, out)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

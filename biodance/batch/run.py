@@ -305,9 +305,18 @@ class Ledger:
 
 @dataclass(frozen=True)
 class BatchRun:
-    """What a run over an ``archive`` came to: the ``folder`` of its results; ``outcomes``, one for every session, of
-    this run or an earlier one, by name; how many sessions were gone through in this run (``fresh``); tables of
-    recordings that are no sessions (``left_out``).
+    """What a run over an archive came to.
+
+    Parameters
+    ----------
+    archive, folder : pathlib.Path
+        Of the recordings and of the results.
+    outcomes : tuple of Outcome
+        One for every session of the archive, of this run or an earlier one, by name.
+    fresh : int
+        Sessions gone through in this run.
+    left_out : tuple of str
+        Tables of recordings that are no sessions.
     """
 
     archive: Path

@@ -59,10 +59,24 @@ class SessionStatus(StrEnum):
 
 @dataclass(frozen=True)
 class SessionTask:
-    """One session to go through: its ``name``, the folder below the archive; folders of the recordings (``session``)
-    and of the results (``out``); ``fingerprint`` of recordings, settings and version (`fingerprint_of`); settings
-    ``chosen``, such as ``filter.cutoff=6``; whether the page is drawn (``pages``; numbers are written always);
-    ``limit`` s after which it is given up; whether the results are also written as ``tables`` (`TABLES`).
+    """One session to go through.
+
+    Parameters
+    ----------
+    name : str
+        The session's folder below the archive.
+    session, out : str
+        Folders of the recordings and of the results.
+    fingerprint : str
+        Of the recordings, the settings and the version (`fingerprint_of`).
+    chosen : tuple of str
+        Settings, such as ``filter.cutoff=6``.
+    pages : bool
+        Whether the page is drawn; numbers are written always.
+    limit : float
+        s after which the session is given up.
+    tables : bool
+        Whether the results are also written as tables, into the folder `TABLES`.
     """
 
     name: str
@@ -77,10 +91,24 @@ class SessionTask:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one session: ``name`` and ``fingerprint`` of its `SessionTask`; its ``status``; the ``reason`` why
-    it is not done, else the first thing that a person must see; ``rows`` of plain values, one for each trial; the
-    ``seconds`` that it took and the ``memory_mb`` that its process had at most; ``why``: what it hangs on; ``limit`` s
-    that it was given.
+    """What became of one session.
+
+    Parameters
+    ----------
+    name, fingerprint : str
+        Of its `SessionTask`.
+    status : SessionStatus
+        What became of it.
+    reason : str
+        Why, where it is not done; else the first thing that a person must see.
+    rows : tuple of dict
+        One for each trial, of plain values.
+    seconds, memory_mb : float
+        It took, and the process had at most.
+    why : Why
+        What it hangs on.
+    limit : float
+        s that it was given.
     """
 
     name: str

@@ -73,9 +73,19 @@ def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array
     """Return the sole (P, 3) m of a foot, counter-clockwise from above: the face of its shapes that lies lowest and
     nearest to horizontal.
 
-    ``where`` file and foot, for messages; ``boxes`` corners (8, 3) m, ``hulls`` (K, 3) m those of meshes, in the frame
-    of the foot; ``axes`` (3, 3) rows: forwards, up and right at zero joint angles, in the frame of the foot. Raises
-    FileRefused: no face points to the ground, or the lowest layer is a point or a line.
+    Parameters
+    ----------
+    where
+        File and foot, for messages.
+    boxes, hulls
+        Corners (8, 3) of boxes and (K, 3) of convex hulls of meshes, m, in the frame of the foot.
+    axes
+        (3, 3), rows: forwards, up and to the right at zero joint angles, in the frame of the foot.
+
+    Raises
+    ------
+    FileRefused
+        No face points to the ground, or the lowest layer is a point or a line.
     """
     from scipy.spatial import ConvexHull, QhullError
 

@@ -113,7 +113,17 @@ class _Server(ThreadingHTTPServer):
 
 class LivePage:
     """A page at ``address`` that shows the newest state of a stream; a context, closed at its end. Once it knows the
-    ``body`` it draws what is asked, too. ``port`` of 127.0.0.1, 0 takes a free one; BiodanceError where it is taken.
+    ``body`` it draws what is asked, too.
+
+    Parameters
+    ----------
+    port : int
+        Of 127.0.0.1; 0 takes a free one.
+
+    Raises
+    ------
+    BiodanceError
+        Another program has the port.
     """
 
     def __init__(self, port: int = 0) -> None:

@@ -54,14 +54,38 @@ _UNREST = ("performance", "tremor", "sway")
 class Laboratory:
     """A place with its instruments, its habits and its people; `draw_laboratory` draws one.
 
-    ``centre`` (2,) m where the subject stands, facing ``heading`` rad from lab x; ``plates`` 1, 2 = one under each
-    foot, 3 and 4: these two and empty ones before and behind them; ``plate_type`` 2 or 4; ``camera_rate`` Hz,
-    ``samples`` of force a frame, ``bits`` of the converter; ``tolerances`` how far everything is from the ideal;
-    ``moment_zero`` N·m, standard deviation of a plate's zero in each moment beyond what belongs to its zero in Fz;
-    ``segments`` 12 to 22 parts of the true body that move by themselves (`draw_laboratory`); ``tissue`` one of
-    `instruments.TISSUES`; ``population`` what its people have in common beside the tables (`draw_sip`), None = nothing;
-    ``joints`` "functional" or "static": how they are placed when its sessions are read; ``children`` whether its people
-    are; ``belts`` 0 = plates in the floor, 1 = one instrumented belt, 2 = a split-belt treadmill, instead of them.
+    Parameters
+    ----------
+    centre : tuple of float
+        (2,) m where the subject stands.
+    heading : float
+        rad from lab x that the subject faces.
+    plates : int
+        1; 2 = one under each foot; 3 and 4: these two and empty ones before and behind them.
+    plate_type : int
+        2 or 4.
+    camera_rate : float
+        Hz.
+    samples : int
+        Of force per camera frame.
+    bits : int
+        Of the converter.
+    tolerances : LabTolerances
+        How far everything is from the ideal here.
+    moment_zero : float
+        N·m, standard deviation of a plate's zero in each moment, beyond what belongs to its zero in Fz.
+    segments : int
+        12 to 22 parts of the true body that move by themselves, see `draw_laboratory`.
+    tissue : str
+        Kind of soft tissue, one of `instruments.TISSUES`.
+    population : int or None
+        What its people have in common beside the tables (`draw_sip`); None = nothing.
+    joints : str
+        "functional" or "static": how the joints are placed when its sessions are read.
+    children : bool
+        Whether its people are children.
+    belts : int
+        0 = plates in the floor; 1 = one instrumented belt, 2 = a split-belt treadmill, instead of them.
     """
 
     centre: tuple[float, float] = (0.3, 0.2)

@@ -70,11 +70,23 @@ def stadium(girth: Array, aspect: Array) -> tuple[Array, Array]:
 
 
 def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -> RigidInertia:
-    """Return volume (as ``mass``, m³), centroid and second moments of volume (m⁵, about the centroid) of a stack along
-    -y from the origin: x anterior, y up, z right, origin in the middle of the proximal section.
+    """Return volume (as ``mass``, m³), centroid and second moments of volume of a stack along -y from the origin.
 
-    ``level`` (n,) ascending, share of the ``length`` m from the proximal end: the first section reaches up to 0, the
-    last to 1; ``girth`` (n,) m; ``aspect`` (n,) breadth (z) over depth (x).
+    Parameters
+    ----------
+    level : array_like
+        (n,) ascending, share of the length from the proximal end; the first section reaches up to 0, the last to 1.
+    girth : array_like
+        (n,) m.
+    aspect : array_like
+        (n,) breadth (z) over depth (x).
+    length : float
+        m.
+
+    Returns
+    -------
+    RigidInertia
+        x anterior, y up, z right, origin in the middle of the proximal section; inertia (m⁵) about the centroid.
     """
     radius, half = stadium(girth, aspect)
     ends = np.unique(np.concatenate([[0.0], level, [1.0]]))

@@ -29,11 +29,19 @@ class _Section(NamedTuple):
 
 
 def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
-    """Return the part (m, 3, 3) m of a closed surface on the side of a plane to which its normal points, closed in the
-    plane; pieces that close the cut may overlap with opposite signs: sums over them are exact.
+    """Return the part of a closed surface on the side of a plane to which its normal points, closed in the plane.
 
-    ``triangles`` (n, 3, 3) m, corners counter-clockwise from outside; ``point`` (3,) m of the plane, ``normal`` (3,) of
-    length one.
+    Parameters
+    ----------
+    triangles : array_like
+        (n, 3, 3) m, corners counter-clockwise from outside.
+    point, normal : array_like
+        (3,) a point of the plane, m, and its normal of length one.
+
+    Returns
+    -------
+    Array
+        (m, 3, 3) m. Pieces that close the cut may overlap with opposite signs: sums over them are exact.
     """
     height = _heights(triangles, point, normal)
     above = height > 0
@@ -107,11 +115,22 @@ class _Scan:
 
 @functools.lru_cache(maxsize=4)
 def read_scan(path: str, stature: float, up: str = "z") -> _Scan:
-    """Return the scan (``path`` of an OBJ, STL or PLY in m, its axis ``up`` points up) of a person of some ``stature``
-    m who stands upright with the arms away from the trunk.
+    """Return the scan of a person who stands upright with the arms away from the trunk.
 
-    Raises SessionRefused: the file is missing or no mesh; the surface is not closed; it is not in m, lies, has no feet
-    or is of somebody else's stature.
+    Parameters
+    ----------
+    path : str
+        OBJ, STL or PLY, in m.
+    stature : float
+        Of the person, m.
+    up : {"z", "y", "x"}
+        Axis of the file that points up.
+
+    Raises
+    ------
+    SessionRefused
+        The file is missing or no mesh; the surface is not closed; it is not in m, lies, has no feet or is of somebody
+        else's stature.
     """
     try:
         mesh = read_mesh(Path(path))

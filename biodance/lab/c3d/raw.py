@@ -80,7 +80,16 @@ def second_opinion(path: Path, numbers: _Numbers, layout: Layout) -> str:
     ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of
     them without looking at the length of the file, as biodance does: no judgement. Left out are analog channels that
     ezc3d 1.7.2 is known to read wrong: those with a negative OFFSET, whose sign it loses, and unsigned integers, which
-    it takes for signed ones. ``numbers`` and ``layout`` as biodance read them.
+    it takes for signed ones.
+
+    Parameters
+    ----------
+    path
+        The file.
+    numbers
+        Points (T, K, 3) in file units, NaN = not seen, and analog (S, C), as biodance read them.
+    layout
+        How biodance understood the data section.
     """
     try:
         child = run_python("-c", READ, str(path), timeout=_PATIENCE)

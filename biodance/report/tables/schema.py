@@ -26,11 +26,18 @@ Row: TypeAlias = dict[str, Any]
 class Schema:
     """What is told of one kind of record.
 
-    ``fields`` keys, the unit as suffix, each with its place in the record: ``"segment kg=mass unit=cause.unit
-    low=interval.0 count=#trials place_m=x.value,y.value"``; without a place the key is the attribute's name; ``#``
-    counts; behind None all is None. ``parts`` more keys -> `Schema` of the record or records of that name, or a
-    function of the whole record; one that stands among the fields, too, has its place there. ``shown`` what people see
-    of a row, column by column: ``"segment: {segment:name} | mass (kg): {kg:2} {sd_kg:±2}"`` (`RowFormat`).
+    Parameters
+    ----------
+    fields : str
+        Keys, the unit as suffix, each with its place in the record: ``"segment kg=mass unit=cause.unit low=interval.0
+        count=#trials place_m=x.value,y.value"``. Without a place the key is the attribute's name; ``#`` counts; behind
+        None all is None.
+    parts : mapping
+        More keys -> `Schema` of the record or records of that name, or a function of the whole record; one that stands
+        among the fields, too, has its place there.
+    shown : str
+        What people see of a row, column by column: ``"segment: {segment:name} | mass (kg): {kg:2} {sd_kg:±2}"``
+        (`RowFormat`).
     """
 
     fields: str
