@@ -22,6 +22,7 @@ ONE_ALGORITHM = {
     "pipeline/front.py": "what is asked of a visit: register, identify, diagnose, compare",
     "batch/run.py": "an archive: what is to do, by whom, and what is done",
     "batch/work.py": "one session in its own process, and its outcome",
+    "body/human/measures.py": "what a subject measures: the posture of the static trial, typed sizes, the markers' own",
     "body/human/human.py": "the human Body and the prior of its masses",
     "body/human/skeleton.py": "the joint tree of a person, with the joints that only some sessions show",
     "body/parts.py": "what a Body is made of, and lumps of mass as ten parameters about a joint",
