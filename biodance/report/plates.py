@@ -2,6 +2,7 @@
 out), and what `biodance plates` prints.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,17 +93,18 @@ def plates_document(found: PlatesJudged) -> Row:
 def _persons(found: PlatesJudged) -> list[Row]:
     """Return every person with visits, what stands out, and what conditions do in that person's visits."""
     judged = found.judgement
-    names = list(dict.fromkeys(visit.person for visit in judged.visits))
+    visits = Counter(visit.person for visit in judged.visits)  # in the order of their first visit
+    conditions = [(one, one.persons) for one in judged.conditions]
     return [
         {
             "person": name,
-            "visits": sum(visit.person == name for visit in judged.visits),
+            "visits": count,
             "findings": [
                 *(_stranger(one) for one in judged.strangers if one.person == name),
-                *(_of_person(one, name) for one in judged.conditions if name in one.persons),
+                *(_of_person(one, *persons[name]) for one, persons in conditions if name in persons),
             ],
         }
-        for name in names
+        for name, count in visits.items()
     ]
 
 
@@ -112,8 +114,7 @@ def _stranger(one: Stranger) -> Row:
     return _personal(what, one.quantity, one.value, one.sd)
 
 
-def _of_person(one: ConditionEffect, person: str) -> Row:
-    value, sd = one.persons[person]
+def _of_person(one: ConditionEffect, value: float, sd: float) -> Row:
     much = said(one.quantity, value)
     text = f"{one.factor} {one.level} reads {much} more than {one.factor} {one.base}."
     return _personal(text, one.quantity, value, sd)
