@@ -6,6 +6,7 @@ summed from the last visit backwards, or over persons: of the order of the rows,
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,11 @@ _LEAST = 2
 _IN_COLUMNS = 1e-9
 """Share of its own information below which a column is one of those in the model."""
 ALL = "all plates"
+_Number = TypeVar("_Number", bound=np.generic)
 
 
 @dataclass(frozen=True)
-class Candidate:
+class PlateCandidate:
     """A column that may explain something: of ``kind`` "step", "visit" or "person"; ``at`` the number of
     visit or person in the archive.
     """
@@ -46,10 +48,10 @@ class Candidates:
     among: tuple[str, ...]
     shares: Array
     several: NDArray[np.intp]
-    every: tuple[Candidate, ...]
+    every: tuple[PlateCandidate, ...]
     kept: NDArray[np.intp]
 
-    def column(self, one: Candidate) -> Array:
+    def column(self, one: PlateCandidate) -> Array:
         """Return (n,) the column of a candidate."""
         visits = self.groups.visits
         counts = {
@@ -103,7 +105,7 @@ class Candidates:
         return np.asarray((self.groups.by_person @ visits)[self.several])
 
 
-def _steps(visits: Array) -> Array:
+def _steps(visits: NDArray[_Number]) -> NDArray[_Number]:
     """Return sums over visits (V, ...) from each on that may be the first after a step."""
     return visits[::-1].cumsum(axis=0)[::-1][_LEAST : len(visits) - _LEAST + 1]
 
@@ -117,7 +119,7 @@ def candidates_of(series: Series) -> Candidates:
     kinds = {"step": groups.visits[_LEAST : groups.visits.size - _LEAST + 1], "visit": groups.visits}
     kinds["person"] = groups.persons[several]
     every = tuple(
-        Candidate(kind, plate, int(at)) for plate in among for kind, numbers in kinds.items() for at in numbers
+        PlateCandidate(kind, plate, int(at)) for plate in among for kind, numbers in kinds.items() for at in numbers
     )
     found = Candidates(groups, among, shares, several, every, np.empty(0, dtype=np.intp))
     return replace(found, kept=_distinct(found))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from biodance.diagnosis.archive.candidates import ALL, Candidate, Candidates, candidates_of
+from biodance.diagnosis.archive.candidates import ALL, Candidates, PlateCandidate, candidates_of
 from biodance.diagnosis.archive.covariance import Projection
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateVisit
 from biodance.diagnosis.archive.series import Fitted, Series, fit_series
@@ -103,7 +103,7 @@ def history(series: Series) -> History:
     `ALARM` of being chance.
     """
     alarm = ALARM * PLATE_QUANTITIES[series.quantity].share
-    possible, chosen = candidates_of(series), list[Candidate]()
+    possible, chosen = candidates_of(series), list[PlateCandidate]()
     while len(chosen) < _MOST:
         best = _next(series, possible, _columns(series, possible, chosen), alarm)
         if best is None:
@@ -114,14 +114,14 @@ def history(series: Series) -> History:
     return _told(series, possible, columns, fit_series(series, columns), chosen)
 
 
-def _next(series: Series, possible: Candidates, columns: Array, alarm: float) -> Candidate | None:
+def _next(series: Series, possible: Candidates, columns: Array, alarm: float) -> PlateCandidate | None:
     """Return what explains most of what ``columns`` (n, K) leave, of the kinds that chance does not explain; None where
     there is nothing.
     """
     if series.value.size - columns.shape[1] < _FEWEST or np.linalg.matrix_rank(columns) < columns.shape[1]:
         return None
     fitted = fit_series(series, columns)
-    sure: list[tuple[float, Candidate]] = []
+    sure: list[tuple[float, PlateCandidate]] = []
     for kinds in (("step",), ("visit", "person")):
         rivals = Rivals(possible, Projection(fitted.rows, columns), possible.where(*kinds))
         if not rivals.index.size:
@@ -181,11 +181,13 @@ def _best(rivals: Rivals, value: Array) -> tuple[float, int]:
     return float(size.max()), int(rivals.index[np.argmax(size >= (1 - _ROUNDING) * size.max())])
 
 
-def _columns(series: Series, possible: Candidates, chosen: list[Candidate]) -> Array:
+def _columns(series: Series, possible: Candidates, chosen: list[PlateCandidate]) -> Array:
     return np.column_stack([series.design, *(possible.column(one) for one in chosen)])
 
 
-def _told(series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[Candidate]) -> History:
+def _told(
+    series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[PlateCandidate]
+) -> History:
     """Return the history with every chosen column as a change or a stranger."""
     changes, strangers = [], []
     first, sd = len(series.plates), np.sqrt(np.diag(fitted.covariance))
@@ -201,7 +203,7 @@ def _told(series: Series, possible: Candidates, columns: Array, fitted: Fitted, 
 
 
 def _change(
-    series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[Candidate], i: int
+    series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[PlateCandidate], i: int
 ) -> Change:
     """Return step ``i`` of those chosen, with the levels beside it and the dates that it may have."""
     one, k = chosen[i], len(series.plates) + i

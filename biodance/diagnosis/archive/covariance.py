@@ -41,7 +41,7 @@ class Groups:
         return _sums(self.person, self.persons.size)
 
 
-def groups_of(visit: NDArray[np.intp], person: NDArray[np.intp]) -> Groups:
+def rows_grouped(visit: NDArray[np.intp], person: NDArray[np.intp]) -> Groups:
     """Return the groups of rows with ``visit`` and ``person`` (n,); a visit is of one person."""
     visits, first, own = np.unique(visit, return_index=True, return_inverse=True)
     persons, whose = np.unique(person[first], return_inverse=True)

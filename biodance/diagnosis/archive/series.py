@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from biodance.diagnosis.archive.covariance import Groups, Projection, RowCovariance, groups_of
+from biodance.diagnosis.archive.covariance import Groups, Projection, RowCovariance, rows_grouped
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
 from biodance.uncertainty.session_noise import NORMAL_OVER_MEDIAN
@@ -47,7 +47,7 @@ class Series:
     @cached_property
     def groups(self) -> Groups:
         """Which rows belong together."""
-        return groups_of(self.visit, self.person)
+        return rows_grouped(self.visit, self.person)
 
 
 @dataclass(frozen=True, eq=False)
