@@ -21,6 +21,7 @@ from biodance.lab.plain_text import refuse_present, whole_file
 from biodance.lab.program_tables import write_mot
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
+from biodance.lab.session.results_folder import doubt_about
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import centre_of_mass, poses
@@ -425,6 +426,15 @@ class _Target:
 
 
 def _of_kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
+    """Write what a results folder keeps; of files beside those that are read, which are refused if they are not as
+    their run wrote them, the sentence says so.
+    """
+    path, said = _kept(folder, trial, target)
+    doubt = doubt_about(folder)
+    return path, f"{said} What is exported is of its run, but look: {doubt}" if doubt else said
+
+
+def _kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
     """Write what a results folder keeps; nothing is tracked or identified again."""
     if target.format not in MOTION_FORMATS:
         return target.body(*read_kept_body(folder))

@@ -123,13 +123,26 @@ def check_results(folder: Path) -> _Verified | None:
     manifest = read_manifest(folder)
     if manifest is None:
         return None
-    there = set(_files_in(folder))
-    known = manifest.outputs
-    changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
+    missing, changed = _not_as_written(folder, manifest)
     recordings = ((Path(manifest.session) / name, sha) for name, sha in sorted(manifest.inputs.items()))
     other = (str(path) for path, sha in recordings if not path.is_file() or file_hash(path) != sha)
-    missing = tuple(sorted(set(known) - there))
-    return _Verified(folder, manifest, missing, tuple(changed), tuple(other), _said_otherwise(folder, manifest))
+    return _Verified(folder, manifest, missing, changed, tuple(other), _said_otherwise(folder, manifest))
+
+
+def _not_as_written(folder: Path, manifest: _Manifest) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the files of a run that are missing, and those that are changed."""
+    there, known = set(_files_in(folder)), manifest.outputs
+    changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
+    return tuple(sorted(set(known) - there)), tuple(changed)
+
+
+def doubt_about(folder: Path) -> str:
+    """Return a sentence on the files of a results folder that are not as its run wrote them; "" where all are, or where
+    it has no manifest.
+    """
+    manifest = read_manifest(folder)
+    odd = sorted({*(found for some in _not_as_written(folder, manifest) for found in some)}) if manifest else []
+    return f"{folder}: not as its run wrote it: {', '.join(odd)} (see biodance verify)." if odd else ""
 
 
 def _said_otherwise(folder: Path, manifest: _Manifest) -> tuple[str, ...]:
