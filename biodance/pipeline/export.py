@@ -21,14 +21,13 @@ from biodance.lab.plain_text import refuse_present, whole_file
 from biodance.lab.program_tables import write_mot
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
-from biodance.lab.session.results_folder import doubt_about
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.program_folders import opensim_coordinates, state_notes, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept, read_kept_body
+from biodance.pipeline.saved_results import doubt_told, kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import contact_of, movement_of, prepare_trial
 from biodance.pipeline.trial_result import TrialResult
@@ -364,7 +363,7 @@ def export(
     if session is None:
         folder = Path(source) if isinstance(source, str | Path) else Path()
         if kept_body(folder).is_file():
-            return _of_kept(folder, trial, target)
+            return doubt_told(folder, *_of_kept(folder, trial, target))
         session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return target.markers(prepare_trial(_chosen(session, trial)).trial)
@@ -426,15 +425,6 @@ class _Target:
 
 
 def _of_kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
-    """Write what a results folder keeps; of files beside those that are read, which are refused if they are not as
-    their run wrote them, the sentence says so.
-    """
-    path, said = _kept(folder, trial, target)
-    doubt = doubt_about(folder)
-    return path, f"{said} What is exported is of its run, but look: {doubt}" if doubt else said
-
-
-def _kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
     """Write what a results folder keeps; nothing is tracked or identified again."""
     if target.format not in MOTION_FORMATS:
         return target.body(*read_kept_body(folder))

@@ -21,7 +21,7 @@ from biodance.errors import FileRefused, SessionRefused, TrialRefused
 from biodance.lab.plain_text import whole_file
 from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session, visit_words
-from biodance.lab.session.results_folder import read_manifest, refuse_mixture
+from biodance.lab.session.results_folder import doubt_about, read_manifest, refuse_mixture
 from biodance.library import refuse_large
 from biodance.motion.contact import ground_contact
 from biodance.motion.soles import soles_from_body
@@ -222,6 +222,14 @@ def read_kept(folder: Path) -> KeptResults:
     if manifest and not session.is_dir():  # the results were moved, the recordings were not
         session = Path(manifest.session)
     return KeptResults(body, source, motions, hashes, loads, cutoffs, session, settings)
+
+
+def doubt_told(folder: Path, written: Path, said: str) -> tuple[Path, str]:
+    """Return a file ``written`` from a results folder and what is ``said`` of it, with the files of the folder that are
+    not as their run wrote them: beside those that were read, which would have been refused.
+    """
+    doubt = doubt_about(folder)
+    return written, f"{said} What is exported is of its run, but look: {doubt}" if doubt else said
 
 
 def _load(trial: Trial) -> Array:
