@@ -40,7 +40,6 @@ ONE_ALGORITHM = {
     "pipeline/learn.py": "what a laboratory learns from its sessions without fault",
     "pipeline/results.py": "the records of one examined session",
     "pipeline/robot.py": "a robot from recording to masses, with what is said of it",
-    "pipeline/saved_results.py": "what a results folder keeps, and from what it was made",
     "pipeline/visits.py": "visits beside each other: their quantities, and what changed",
     "records/session.py": "who came, and what was recorded of him, checked at birth",
     "records/wrench.py": "what was measured: where it came from, markers, plates, the wrench of all of them",

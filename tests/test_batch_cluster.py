@@ -18,16 +18,27 @@ import pytest
 from batch_work import archive_of, client_of, worked
 
 from biodance.batch.run import LEDGER, run_batch
+from biodance.batch.work import Outcome, SessionTask
 from biodance.errors import BiodanceError
 
 
-def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
+def test_a_cluster_that_exists_is_used(tmp_path: Path, monkeypatch) -> None:
+    """Its workers have working folders of their own: what they are told is absolute, though both folders are given as
+    seen from ours.
+    """
     distributed = pytest.importorskip("distributed")
     archive = archive_of(tmp_path / "a", 3)
+    monkeypatch.chdir(tmp_path)
+
+    def count(task: SessionTask) -> Outcome:
+        assert Path(task.session).is_absolute()
+        assert Path(task.out).is_absolute()
+        return batch_work.count(task)
+
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
-        found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.count)
+        found = run_batch(Path("a"), Path("out"), workers=cluster.scheduler_address, work=count)
         real = run_batch(archive, tmp_path / "real", workers=cluster.scheduler_address, pages=False)
     assert found.fresh == 3
     assert worked(archive) == {"s0": 1, "s1": 1, "s2": 1}

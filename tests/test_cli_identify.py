@@ -15,6 +15,7 @@ from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.effects import QualityCheck
 from biodance.lab.program_tables import read_mot
+from biodance.lab.session.results_folder import check_results
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
 SAID = "A and B carry each other's names. Exchange them, or accept the correction."
@@ -88,6 +89,22 @@ def test_the_identified_body_is_exported_from_session_and_from_results(format, l
     assert "identified from fit_0" in capsys.readouterr().err
     if format == "csv":
         assert np.array_equal(parameters_in(files[0]), session_result().identification.identification.sip.phi)
+
+
+def test_a_changed_file_beside_what_is_exported_is_said(lab, no_page, capsys):
+    """The body is as the run wrote it and goes; results.json is not. The manifest has the settings of results.json."""
+    run(["identify", str(lab / "S01"), "--out", str(lab / "out")])
+    found = check_results(lab / "out")
+    assert found.whole
+    provenance = json.loads((lab / "out" / "results.json").read_text())["provenance"]
+    assert found.manifest.settings == provenance["settings"]
+    assert found.manifest.commit == provenance["commit"]
+    assert run(["export", str(lab / "out"), "--format", "csv", "--out", str(lab / "a.csv")]) == DONE
+    assert "not as its run wrote it" not in capsys.readouterr().err
+    (lab / "out" / "results.json").write_text((lab / "out" / "results.json").read_text() + " ")
+    assert run(["export", str(lab / "out"), "--format", "csv", "--out", str(lab / "b.csv")]) == DONE
+    assert "not as its run wrote it: results.json (see biodance verify)" in " ".join(capsys.readouterr().err.split())
+    assert (lab / "a.csv").read_bytes() == (lab / "b.csv").read_bytes()
 
 
 def test_without_identification_the_table_is_exported_and_that_is_said(lab, capsys):

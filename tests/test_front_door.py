@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import biodance
-from biodance.pipeline.saved_results import _UNKNOWN, blas, commit
+from biodance.pipeline.saved_results import blas
+from biodance.version import NO_COMMIT, commit
 
 DOOR = Path(biodance.__file__)
 
@@ -174,7 +175,7 @@ def test_the_commit_is_that_of_the_checkout_and_unknown_in_a_wheel(tmp_path):
     package = tmp_path / "biodance"
     package.mkdir()
     (package / "a.py").write_text("1")
-    assert commit(package) == _UNKNOWN
+    assert commit(package) == NO_COMMIT
     for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "one"]):
         subprocess.run([*git, *words], cwd=tmp_path, check=True)
     commit.cache_clear()

@@ -135,6 +135,47 @@ def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path
     assert not found.whole
 
 
+def told(version: str, commit: str, **settings: object) -> str:
+    """Return a results.json of which only the provenance matters."""
+    return json.dumps({"provenance": {"versions": {"biodance": version}, "commit": commit, "settings": settings}})
+
+
+def test_the_manifest_binds_commit_and_settings(session: Path, tmp_path: Path, capsys, monkeypatch) -> None:
+    """Two runs with another cut-off, by another commit: each is whole, and `verify` says in what they differ."""
+    commits = {"one": "a" * 40, "two": f"{'b' * 40}+changed"}
+    for cutoff, (name, commit) in zip((6.0, 8.0), commits.items(), strict=True):
+        monkeypatch.setattr(rooms, "commit", lambda commit=commit: commit)
+        made = results_folder(tmp_path / "all" / name, session)
+        (made.part / "results.json").write_text(told(rooms.__version__, commit, hip="hara", cutoff=cutoff))
+        made.finish(session, {}, {"hip": "hara", "cutoff": cutoff})
+    kept = read_manifest(tmp_path / "all" / "two")
+    assert kept is not None
+    assert (kept.commit, kept.settings) == (commits["two"], {"hip": "hara", "cutoff": 8.0})
+    assert command(["verify", str(tmp_path / "all")]) == 0
+    said = capsys.readouterr().out
+    assert "one: whole, biodance 0.1.0, commit aaaaaaaaaaaa\n" in said
+    assert "two: whole, biodance 0.1.0, commit bbbbbbbbbbbb+changed\n" in said
+    assert "setting cutoff: 6.0 in 1, 8.0 in 1" in said
+    assert "commit: aaaaaaaa" in said
+    assert "hip" not in said
+    results = tmp_path / "all" / "one" / "results.json"
+    results.write_text(told("0.0.9", commits["two"], hip="hara", cutoff=8.0))
+    assert command(["verify", str(tmp_path / "all" / "one")]) == 1
+    said = capsys.readouterr().out
+    assert "changed: results.json; manifest and results.json differ in: version, commit, setting cutoff" in said
+
+
+def test_a_manifest_from_before_commit_and_settings_is_read(session: Path, tmp_path: Path) -> None:
+    run(session, tmp_path / "out", {"results.json": told("0.1.0", "c" * 40, hip="hara")})
+    path = tmp_path / "out" / "manifest.json"
+    earlier = {key: one for key, one in json.loads(path.read_text()).items() if key not in ("commit", "settings")}
+    path.write_text(json.dumps(earlier))
+    found = check_results(tmp_path / "out")
+    assert found is not None
+    assert found.whole
+    assert (found.manifest.commit, found.otherwise) == ("unknown", ())
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"run": "1"})])
 def test_a_damaged_manifest_is_one_sentence(session: Path, tmp_path: Path, text: str) -> None:
     run(session, tmp_path / "out", FIRST)

@@ -15,18 +15,22 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.session.file import FILES
 from biodance.lab.session.results_folder import inputs_of, put_in_place, read_manifest, refuse_mixture, write_manifest
 from biodance.library import parse_json
+from biodance.settings import Value
 from biodance.version import __version__
+
+if TYPE_CHECKING:
+    from biodance.records import Session
 
 OUTCOME = "outcome.json"
 """In a session's folder: where it and the manifest are, the session is done."""
@@ -197,12 +201,12 @@ def process_session(task: SessionTask) -> Outcome:
                 log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
                 log.flush()
 
-            outcome, inputs = _attempt(task, part, tell)
+            outcome, inputs, settings = _attempt(task, part, tell)
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
             seconds = time.perf_counter() - started
             outcome = replace(outcome, seconds=round(seconds, 2), memory_mb=round(memory, 1), limit=task.limit)
             (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
-            write_manifest(part, Path(task.session), inputs)
+            write_manifest(part, Path(task.session), inputs, settings)
             put_in_place(part, place)
     except OSError as error:
         return untold(task, SessionStatus.FAILED, f"{place}: {error.strerror or error}.", Why.MACHINE)
@@ -248,13 +252,19 @@ def clear_up(folder: Path) -> None:
             log.close()
 
 
-def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[Outcome, dict[str, str]]:
-    """Return what became of a session and the hashes of its recordings; what is raised becomes a status."""
+def _attempt(
+    task: SessionTask, folder: Path, tell: Callable[[str], None]
+) -> tuple[Outcome, dict[str, str], Mapping[str, Value]]:
+    """Return what became of a session, the hashes of its recordings and its settings; what is raised becomes a
+    status.
+    """
     status, why = SessionStatus.FAILED, Why.MACHINE
     try:
         with _limited(task.limit):
-            status, reason, rows, inputs = _examined(task, folder, tell)
-            return Outcome(task.name, task.fingerprint, status, reason, rows), inputs
+            status, reason, rows, session = _examined(task, folder, tell)
+            read = {trial.source.path: trial.source.sha256 for trial in session.trials}
+            outcome = Outcome(task.name, task.fingerprint, status, reason, rows)
+            return outcome, inputs_of(read, session.folder), session.settings.as_dict()
     except BiodanceError as error:
         why, reason = _hangs_on(error), str(error)
         status = SessionStatus.REFUSED if why is Why.SESSION else SessionStatus.FAILED
@@ -269,7 +279,7 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tu
         why, reason = Why.SESSION, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
     reason = readable(reason)
     tell(f"{status}: {reason}")
-    return untold(task, status, reason, why), {}
+    return untold(task, status, reason, why), {}, {}
 
 
 def _hangs_on(error: BaseException) -> Why:
@@ -282,8 +292,8 @@ def _hangs_on(error: BaseException) -> Why:
 
 def _examined(
     task: SessionTask, folder: Path, tell: Callable[[str], None]
-) -> tuple[SessionStatus, str, TrialRows, dict[str, str]]:
-    """Return status, reason, rows and the hashes of the recordings of a session that goes through."""
+) -> "tuple[SessionStatus, str, TrialRows, Session]":
+    """Return status, reason and rows of a session that goes through, and the session as read."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.load import as_diagnosed
@@ -307,9 +317,8 @@ def _examined(
     first = document["attention"][0]["text"] if document["attention"] else ""
     well = all(row["level"] == "note" for row in document["attention"])
     status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
-    read = {trial.source.path: trial.source.sha256 for trial in session.trials}
     tell(f"{status}: {first}")
-    return status, first, trial_rows(document), inputs_of(read, session.folder)
+    return status, first, trial_rows(document), session
 
 
 @contextmanager

@@ -139,7 +139,7 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
     from dataclasses import asdict
 
     from biodance.errors import BiodanceError
-    from biodance.lab.session.results_folder import check_results, results_below
+    from biodance.lab.session.results_folder import check_results, differing, results_below
 
     folders = results_below(place) if place.is_dir() else ()
     if not folders:
@@ -149,6 +149,9 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
         print_json([{**asdict(one), "folder": str(one.folder), "whole": one.whole} for one in found])
     for one in () if json else found:
         wrong = {"missing": one.missing, "changed": one.changed, "recordings changed or not there": one.inputs_changed}
+        wrong |= {"manifest and results.json differ in": one.otherwise}
         said = "; ".join(f"{what}: {', '.join(names)}" for what, names in wrong.items() if names)
-        sys.stdout.write(without_codes(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.version}") + "\n")
+        sys.stdout.write(without_codes(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.software}") + "\n")
+    if not json and (differ := differing(found)):
+        sys.stdout.write(without_codes(f"look: not all of these folders were made alike; {'; '.join(differ)}") + "\n")
     return DONE if all(one.whole and not one.inputs_changed for one in found) else NEEDS_A_PERSON

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
+    from biodance.settings import Value
 
 
 def report_session(
@@ -214,16 +215,19 @@ def compare_command(
 
 def put_session_results(place: "ResultsFolder", session: "Session") -> Path:
     """Put the results of a session in place and return the folder."""
-    return put_results(place, session.folder, {trial.source.path: trial.source.sha256 for trial in session.trials})
+    inputs = {trial.source.path: trial.source.sha256 for trial in session.trials}
+    return put_results(place, session.folder, inputs, session.settings.as_dict())
 
 
-def put_results(place: "ResultsFolder", source: Path, inputs: Mapping[Path, str]) -> Path:
-    """Put results in place, bound to the recordings ``inputs`` (path -> SHA-256) of ``source``, and return the folder;
-    say where files went that were there and are not of biodance.
+def put_results(
+    place: "ResultsFolder", source: Path, inputs: Mapping[Path, str], settings: "Mapping[str, Value] | None" = None
+) -> Path:
+    """Put results in place, bound to the recordings ``inputs`` (path -> SHA-256) of ``source`` and to the ``settings``,
+    and return the folder; say where files went that were there and are not of biodance.
     """
     from biodance.lab.session.results_folder import inputs_of
 
-    kept = place.finish(source, inputs_of(inputs, source))
+    kept = place.finish(source, inputs_of(inputs, source), settings or {})
     if kept is not None:
         say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
     return place.place

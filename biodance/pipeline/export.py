@@ -27,7 +27,7 @@ from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.program_folders import opensim_coordinates, state_notes, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept, read_kept_body
+from biodance.pipeline.saved_results import doubt_told, kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import contact_of, movement_of, prepare_trial
 from biodance.pipeline.trial_result import TrialResult
@@ -363,7 +363,7 @@ def export(
     if session is None:
         folder = Path(source) if isinstance(source, str | Path) else Path()
         if kept_body(folder).is_file():
-            return _of_kept(folder, trial, target)
+            return doubt_told(folder, *_of_kept(folder, trial, target))
         session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return target.markers(prepare_trial(_chosen(session, trial)).trial)

@@ -5,12 +5,10 @@ can be made again: the software, the files and the settings.
 import json
 import os
 import platform
-import subprocess
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -23,8 +21,8 @@ from biodance.errors import FileRefused, SessionRefused, TrialRefused
 from biodance.lab.plain_text import whole_file
 from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session, visit_words
-from biodance.lab.session.results_folder import read_manifest, refuse_mixture
-from biodance.library import PACKAGE, refuse_large
+from biodance.lab.session.results_folder import doubt_about, read_manifest, refuse_mixture
+from biodance.library import refuse_large
 from biodance.motion.contact import ground_contact
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
@@ -33,7 +31,7 @@ from biodance.pipeline.trial_result import Step, TrialResult
 from biodance.records import Array, Motion, Session, Trial
 from biodance.records.motion import BY_FRAME
 from biodance.settings import Value
-from biodance.version import __version__
+from biodance.version import __version__, commit
 
 LIBRARIES = (
     *("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel"),
@@ -70,26 +68,6 @@ def _version(library: str) -> str:
         return version(library)
     except PackageNotFoundError:
         return "not installed"
-
-
-@cache
-def commit(package: Path = PACKAGE) -> str:
-    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else
-    "unknown".
-    """
-    if not (package.parent / ".git").exists():
-        return _UNKNOWN
-    try:
-        found = _git(package.parent, "rev-parse", "HEAD")
-        return found + ("+changed" if _git(package.parent, "status", "--porcelain", "--untracked-files=no") else "")
-    except (OSError, subprocess.SubprocessError):
-        return _UNKNOWN
-
-
-def _git(folder: Path, *words: str) -> str:
-    return subprocess.run(
-        ["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10
-    ).stdout.strip()
 
 
 def blas() -> str:
@@ -244,6 +222,14 @@ def read_kept(folder: Path) -> KeptResults:
     if manifest and not session.is_dir():  # the results were moved, the recordings were not
         session = Path(manifest.session)
     return KeptResults(body, source, motions, hashes, loads, cutoffs, session, settings)
+
+
+def doubt_told(folder: Path, written: Path, said: str) -> tuple[Path, str]:
+    """Return a file ``written`` from a results folder and what is ``said`` of it, with the files of the folder that are
+    not as their run wrote them: beside those that were read, which would have been refused.
+    """
+    doubt = doubt_about(folder)
+    return written, f"{said} What is exported is of its run, but look: {doubt}" if doubt else said
 
 
 def _load(trial: Trial) -> Array:

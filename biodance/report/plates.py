@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from biodance.diagnosis.archive.changes import ALL, Change, History
+from biodance.diagnosis.archive.candidates import ALL
+from biodance.diagnosis.archive.changes import Change, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.judge import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES

@@ -9,9 +9,11 @@ columns: Andrews 1993, doi:10.2307/2951764, without its asymptotics). Then it jo
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from biodance.diagnosis.archive.candidates import ALL, Candidates, PlateCandidate, candidates_of
+from biodance.diagnosis.archive.covariance import Projection
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateVisit
 from biodance.diagnosis.archive.series import Fitted, Series, fit_series
 from biodance.records import Array
@@ -21,14 +23,13 @@ ALARM = 0.04
 (docs/benchmarks/plates.md), as variances are known from the same few visits."""
 _MOST = 8
 """Steps and strangers looked for in one series."""
-_LEAST = 2
-"""Visits on each side of a step."""
 _FEWEST = 3
 """Rows beyond the columns without which nothing is looked for."""
-_DRAWS = 6000
+_DRAWS, _AT_ONCE, _NUMBERS = 6000, 500, 4_000_000
+"""Draws of the largest effect; at most so many at once, and so many numbers of one kind in memory."""
+_ROUNDING = 1e-9
 _DATE = 3.84
 """Fall of twice the log likelihood within which a date is not excluded (chi-square, 95 %)."""
-ALL = "all plates"
 
 
 @dataclass(frozen=True)
@@ -97,122 +98,103 @@ class History:
         return float(weight @ self.fitted.beta), float(np.sqrt(weight @ self.fitted.covariance @ weight))
 
 
-@dataclass(frozen=True, eq=False)
-class _Candidate:
-    """A column that may explain something: of ``kind`` "step", "visit" or "person"; ``at`` the index of visit or
-    person.
-    """
-
-    kind: str
-    plate: str
-    at: int
-    column: Array
-
-
 def history(series: Series) -> History:
     """Return what changed and who stands out in a series, each kind with a probability below the quantity's share of
     `ALARM` of being chance.
     """
     alarm = ALARM * PLATE_QUANTITIES[series.quantity].share
-    chosen: list[_Candidate] = []
-    while len(chosen) < _MOST and (best := _next(series, _columns(series, chosen), alarm)) is not None:
+    possible, chosen = candidates_of(series), list[PlateCandidate]()
+    while len(chosen) < _MOST:
+        best = _next(series, possible, _columns(series, possible, chosen), alarm)
+        if best is None:
+            break
         chosen.append(best)
     chosen.sort(key=lambda one: (one.kind != "step", one.at))
-    columns = _columns(series, chosen)
-    return _told(series, columns, fit_series(series, columns), chosen)
+    columns = _columns(series, possible, chosen)
+    return _told(series, possible, columns, fit_series(series, columns), chosen)
 
 
-def _next(series: Series, columns: Array, alarm: float) -> _Candidate | None:
+def _next(series: Series, possible: Candidates, columns: Array, alarm: float) -> PlateCandidate | None:
     """Return what explains most of what ``columns`` (n, K) leave, of the kinds that chance does not explain; None where
     there is nothing.
     """
-    possible = [
-        one
-        for one in possible_columns(series)
-        if np.linalg.matrix_rank(np.column_stack([columns, one.column])) > columns.shape[1]
-    ]
-    if series.value.size - columns.shape[1] < _FEWEST:
+    if series.value.size - columns.shape[1] < _FEWEST or np.linalg.matrix_rank(columns) < columns.shape[1]:
         return None
-    sure: list[tuple[float, _Candidate]] = []
-    for kind in (True, False):
-        rivals = [one for one in possible if (one.kind == "step") == kind]
-        if rivals:
-            first = rivals[int(np.argmax(_studentised(series, columns, rivals, fit_series(series, columns))))]
-            known = fit_series(
-                series, np.column_stack([columns, first.column])
-            )  # variances that a step does not blow up
-            size = _studentised(series, columns, rivals, known)
-            if _chance(series, columns, rivals, known, float(size.max())) <= alarm:
-                sure.append((float(size.max()), rivals[int(np.argmax(size))]))
+    fitted = fit_series(series, columns)
+    sure: list[tuple[float, PlateCandidate]] = []
+    for kinds in (("step",), ("visit", "person")):
+        rivals = Rivals(possible, Projection(fitted.rows, columns), possible.where(*kinds))
+        if not rivals.index.size:
+            continue
+        first = possible.every[_best(rivals, series.value)[1]]
+        again = fit_series(series, np.column_stack([columns, possible.column(first)]))
+        rivals = Rivals(possible, Projection(again.rows, columns), rivals.index)  # variances not blown up by a step
+        size, best = _best(rivals, series.value)
+        if rivals.chance(size, enough=alarm) <= alarm:
+            sure.append((size, possible.every[best]))
     return max(sure, key=lambda pair: pair[0])[1] if sure else None
 
 
-def possible_columns(series: Series) -> list[_Candidate]:
-    """Return all columns that are looked at: steps with at least two visits on each side, visits, persons with several
-    visits; of one plate, and of all plates where there are several.
+class Rivals:
+    """Candidates ``index`` (m,) of one kind beside the columns of a model (``known``): only those that these columns do
+    not hold already.
     """
-    among = [(plate, series.design[:, i]) for i, plate in enumerate(series.plates)]
-    if len(among) > 1:
-        among.insert(0, (ALL, series.design.sum(axis=1)))
-    seen, out = np.unique(series.visit), []
-    for plate, share in among:
-        out += [
-            _Candidate("step", plate, int(v), share * (series.visit >= v))
-            for v in seen[_LEAST : seen.size - _LEAST + 1]
-        ]
-        out += [_Candidate("visit", plate, int(v), share * (series.visit == v)) for v in seen]
-        several = [p for p in np.unique(series.person) if np.unique(series.visit[series.person == p]).size > 1]
-        out += [_Candidate("person", plate, int(p), share * (series.person == p)) for p in several]
-    distinct: dict[bytes, _Candidate] = {}
-    for one in out:
-        distinct.setdefault(one.column.tobytes(), one)
-    return [one for one in distinct.values() if one.column.any()]
+
+    def __init__(self, possible: Candidates, known: Projection, index: NDArray[np.intp]) -> None:
+        free = possible.free(known)[index]
+        self.possible, self.known, self.index, self.free = possible, known, index[free > 0], free[free > 0]
+        self._degrees = known.columns.shape[0] - known.columns.shape[1]
+
+    def effects(self, value: Array) -> Array:
+        """Return c' P y / sqrt(c' P c) (m, draws) of ``value`` y (n, draws), each with variance 1 if V is right: the
+        square is the fall of twice the log likelihood, were the candidate in the model.
+        """
+        return self._along(self.known.left(value)[0])
+
+    def studentised(self, value: Array) -> Array:
+        """Return (m, draws) effects over the root mean square of what each leaves of ``value`` (n, draws)."""
+        weighted, square = self.known.left(value)
+        along = self._along(weighted)
+        left = np.maximum(square - along**2, 1e-12)
+        return np.asarray(along / np.sqrt(left / (self._degrees - 1)))
+
+    def _along(self, weighted: Array) -> Array:
+        return np.asarray(self.possible.sums(weighted)[self.index] / np.sqrt(self.free)[:, None])
+
+    def chance(self, size: float, *, enough: float = 1.0) -> float:
+        """Return how often pure chance makes any candidate as large as ``size``: of 6,000 draws, which end as soon as
+        it is sure that it is more often than ``enough``.
+        """
+        chance, larger, drawn = np.random.default_rng(1), 0, 0
+        while drawn < _DRAWS and 1 + larger <= enough * (1 + _DRAWS):
+            count = min(_AT_ONCE, _DRAWS - drawn, 1 + _NUMBERS // (len(self.possible.every) + self._degrees))
+            largest = np.abs(self.studentised(self.known.rows.draw(chance, count))).max(axis=0)
+            larger, drawn = larger + int(np.sum(largest >= size)), drawn + count
+        return (1 + larger) / (1 + _DRAWS)
 
 
-def _columns(series: Series, chosen: list[_Candidate]) -> Array:
-    return np.column_stack([series.design, *(one.column for one in chosen)])
-
-
-def _white(series: Series, columns: Array, possible: list[_Candidate], known: Fitted) -> tuple[Array, Array, Array]:
-    """Return in the space that ``columns`` do not explain (f = n - K dimensions): an orthonormal basis (n, f), unit
-    directions of the candidates (f, m), and the data (f,), all white.
+def _best(rivals: Rivals, value: Array) -> tuple[float, int]:
+    """Return the largest studentised effect in ``value`` (n,), and which candidate it is: the first of those that
+    differ by rounding only.
     """
-    raw = np.column_stack([columns, *(one.column for one in possible), series.value])
-    white = solve_triangular(known.lower, raw, lower=True)
-    k = columns.shape[1]
-    basis = np.linalg.qr(white[:, :k], mode="complete")[0][:, k:]
-    rest = basis.T @ white[:, k:-1]
-    return basis, rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-12), basis.T @ white[:, -1]
+    size = np.abs(rivals.studentised(value[:, None])[:, 0])
+    return float(size.max()), int(rivals.index[np.argmax(size >= (1 - _ROUNDING) * size.max())])
 
 
-def _largest(directions: Array, data: Array) -> Array:
-    """Return the studentised effects (m, draws) of directions (f, m) in data (f, draws)."""
-    along = directions.T @ data
-    left = np.maximum((data**2).sum(axis=0) - along**2, 1e-12)
-    return np.asarray(along / np.sqrt(left / (len(data) - 1)))
+def _columns(series: Series, possible: Candidates, chosen: list[PlateCandidate]) -> Array:
+    return np.column_stack([series.design, *(possible.column(one) for one in chosen)])
 
 
-def _studentised(series: Series, columns: Array, possible: list[_Candidate], known: Fitted) -> Array:
-    _, directions, data = _white(series, columns, possible, known)
-    return np.abs(_largest(directions, data[:, None])[:, 0])
-
-
-def _chance(series: Series, columns: Array, possible: list[_Candidate], known: Fitted, size: float) -> float:
-    """Return how often pure chance makes any candidate as large as ``size``."""
-    _, directions, data = _white(series, columns, possible, known)
-    draws = np.random.default_rng(1).standard_normal((data.size, _DRAWS))
-    largest = np.concatenate([np.abs(_largest(directions, part)).max(axis=0) for part in np.array_split(draws, 6, 1)])
-    return float((1 + np.sum(largest >= size)) / (1 + _DRAWS))
-
-
-def _told(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candidate]) -> History:
+def _told(
+    series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[PlateCandidate]
+) -> History:
     """Return the history with every chosen column as a change or a stranger."""
     changes, strangers = [], []
     first, sd = len(series.plates), np.sqrt(np.diag(fitted.covariance))
     for i, one in enumerate(chosen):
         value, error = float(fitted.beta[first + i]), float(sd[first + i])
         if one.kind == "step":
-            changes.append(_change(series, columns, fitted, chosen, i))
+            changes.append(_change(series, possible, columns, fitted, chosen, i))
         else:
             visit = series.visits[one.at] if one.kind == "visit" else None
             person = visit.person if visit else sorted({v.person for v in series.visits})[one.at]
@@ -220,7 +202,9 @@ def _told(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candidat
     return History(series, columns, fitted, tuple(changes), tuple(strangers))
 
 
-def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candidate], i: int) -> Change:
+def _change(
+    series: Series, possible: Candidates, columns: Array, fitted: Fitted, chosen: list[PlateCandidate], i: int
+) -> Change:
     """Return step ``i`` of those chosen, with the levels beside it and the dates that it may have."""
     one, k = chosen[i], len(series.plates) + i
     size, error = float(fitted.beta[k]), float(np.sqrt(fitted.covariance[k, k]))
@@ -232,11 +216,10 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     ]
     before = float(fitted.beta[series.plates.index(plate)] + sum(fitted.beta[len(series.plates) + j] for j in earlier))
     others = np.delete(columns, k, axis=1)
-    dates = [other for other in possible_columns(series) if other.kind == "step" and other.plate == one.plate]
-    _, directions, data = _white(series, others, dates, fitted)
-    fall = (directions.T @ data) ** 2
-    possible = [other.at for other, gain in zip(dates, fall, strict=True) if fall.max() - gain <= _DATE]
-    first, last = (series.visits[v] for v in (min(possible), max(possible)))
+    dates = Rivals(possible, Projection(fitted.rows, others), possible.where("step", plate=one.plate))
+    fall = dates.effects(series.value[:, None])[:, 0] ** 2
+    near = [possible.every[k].at for k in dates.index[fall.max() - fall <= _DATE]]
+    first, last = (series.visits[v] for v in (min(near), max(near)))
     free = max(1, np.unique(series.visit).size - columns.shape[1])  # visits that tell how much visits differ
     half = float(stdtrit(free, 0.975)) * error
     return Change(

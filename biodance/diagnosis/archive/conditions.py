@@ -152,7 +152,9 @@ def _kinds(observations: Sequence[PlateEvidence]) -> list[list[PlateEvidence]]:
 def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
     """Return what every level of every factor changes, pooled over the visits that have it beside the base."""
     bases = {factor: _base(some, factor) for factor in sorted({name for one in some for name in one.conditions})}
-    visits = {visit: [one for one in some if one.visit == visit] for visit in sorted({o.visit for o in some}, key=str)}
+    visits: dict[PlateVisit, list[PlateEvidence]] = {}
+    for one in sorted(some, key=lambda one: str(one.visit)):  # stable: trials of a visit stay in their order
+        visits.setdefault(one.visit, []).append(one)
     spread = _pooled_scatter(list(visits.values()), bases)
     found: dict[tuple[str, str], list[tuple[PlateVisit, float, float]]] = {}
     for visit, own in visits.items():

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
-from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stranger, history
+from biodance.diagnosis.archive.candidates import ALL
+from biodance.diagnosis.archive.changes import ALARM, Change, History, Stranger, history
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit, in_order
 from biodance.diagnosis.archive.series import series_of

@@ -90,9 +90,11 @@ def daily_rows(observations: Sequence[PlateEvidence]) -> list[dict[str, Any]]:
     every quantity, the unit as suffix (gain without); ``offset_taken_off`` whether the reader subtracted the offsets.
     """
     plates = sorted({plate for one in observations for plate in one.plates})
-    rows = []
+    rows, by_visit = [], dict[PlateVisit, list[PlateEvidence]]()
+    for one in observations:
+        by_visit.setdefault(one.visit, []).append(one)
     for visit in in_order(observations):
-        own = [one for one in observations if one.visit == visit]
+        own = by_visit[visit]
         for plate in plates:
             some = [
                 one for one in own if plate in one.plates and max(one.plates.values()) / sum(one.plates.values()) > 0.9

@@ -9,12 +9,13 @@ matters for archives of a few visits only.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
+from biodance.diagnosis.archive.covariance import Groups, Projection, RowCovariance, rows_grouped
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
 from biodance.uncertainty.session_noise import NORMAL_OVER_MEDIAN
@@ -43,16 +44,21 @@ class Series:
     visit: NDArray[np.intp]
     person: NDArray[np.intp]
 
+    @cached_property
+    def groups(self) -> Groups:
+        """Which rows belong together."""
+        return rows_grouped(self.visit, self.person)
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A series fitted with columns: ``beta`` (K,) with ``covariance`` (K, K), the Cholesky factor ``lower`` (n, n) of
-    the rows' covariance, the standard deviations ``between`` visits and of one plate in a visit ``alone``.
+    """A series fitted with columns: ``beta`` (K,) with ``covariance`` (K, K), the covariance of the ``rows``, the
+    standard deviations ``between`` visits and of one plate in a visit ``alone``.
     """
 
     beta: Array
     covariance: Array
-    lower: Array
+    rows: RowCovariance
     between: float
     alone: float
 
@@ -64,13 +70,14 @@ def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tupl
     seen = [one for one in observations if one.quantity == quantity]
     plates = tuple(sorted({plate for one in seen for plate in one.plates}))
     groups: dict[tuple[int, tuple[tuple[str, float], ...]], list[PlateEvidence]] = {}
+    place = {visit: v for v, visit in enumerate(visits)}
     for one in seen:
         share = tuple(sorted((plate, round(part, 1)) for plate, part in one.plates.items()))
-        groups.setdefault((visits.index(one.visit), share), []).append(one)
-    persons = sorted({visit.person for visit in visits})
+        groups.setdefault((place[one.visit], share), []).append(one)
+    persons = {name: p for p, name in enumerate(sorted({visit.person for visit in visits}))}
     scatter = _scatter(list(groups.values()))
     rows = [
-        (*_mean(some, scatter, quantity), dict(share), v, persons.index(visits[v].person))
+        (*_mean(some, scatter, quantity), dict(share), v, persons[visits[v].person])
         for (v, share), some in sorted(groups.items())
     ]
     design = np.array([[row[2].get(plate, 0.0) for plate in plates] for row in rows]).reshape(-1, len(plates))
@@ -113,50 +120,22 @@ def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[flo
 
 def fit_series(series: Series, columns: Array) -> Fitted:
     """Return the generalised least squares of a series on ``columns`` (n, K) at the best variances."""
-    shared = [_alike(series.visit)]
+    groups = series.groups
     several = series.design.shape[1] > 1
-    typical = [PLATE_QUANTITIES[series.quantity].typical]
-    if several:
-        shared.append(np.eye(series.value.size))
-        typical.append(_ONE_PLATE * typical[0])
-    if np.unique(series.person).size < np.unique(series.visit).size and np.unique(series.person).size > 1:
-        shared.append(_alike(series.person))
-        typical.append(typical[0])
-    start = np.log(typical)
+    again = 1 < groups.persons.size < groups.visits.size
+    shares = [1.0, *[_ONE_PLATE] * several, *[1.0] * again]  # visits, one plate in a visit, persons
+    start = np.log(PLATE_QUANTITIES[series.quantity].typical * np.array(shares))
+
+    def explained(log_sd: Array) -> Projection:
+        variance = [float(one) for one in np.exp(2 * log_sd)]
+        alone = series.sd**2 + (variance[1] if several else 0.0)
+        return Projection(RowCovariance(groups, alone, variance[0], variance[-1] if again else 0.0), columns)
 
     def cost(log_sd: Array) -> float:
-        lower = np.asarray(np.linalg.cholesky(_covariance(series, shared, log_sd)))
-        return _restricted(lower, series.value, columns) + float(np.sum(((log_sd - start) / _DOUBT) ** 2) / 2)
+        return explained(log_sd).restricted(series.value) + float(np.sum(((log_sd - start) / _DOUBT) ** 2) / 2)
 
     best = minimize(cost, start, method="L-BFGS-B", bounds=[(low - 4, low + 8) for low in start]).x
-    lower = np.asarray(np.linalg.cholesky(_covariance(series, shared, best)))
-    white = solve_triangular(lower, np.column_stack([columns, series.value]), lower=True)
-    factor = cho_factor(white[:, :-1].T @ white[:, :-1] + 1e-12 * np.eye(columns.shape[1]))
-    beta = cho_solve(factor, white[:, :-1].T @ white[:, -1])
-    return Fitted(
-        beta,
-        cho_solve(factor, np.eye(beta.size)),
-        lower,
-        float(np.exp(best[0])),
-        float(np.exp(best[1])) if several else 0.0,
-    )
-
-
-def _alike(index: NDArray[np.intp]) -> Array:
-    """Return (n, n) ones where two rows have the same index."""
-    return (index[:, None] == index[None, :]).astype(float)
-
-
-def _covariance(series: Series, shared: list[Array], log_sd: Array) -> Array:
-    out = np.diag(series.sd**2)
-    for same, size in zip(shared, log_sd, strict=True):
-        out += np.exp(2 * size) * same
-    return out
-
-
-def _restricted(lower: Array, value: Array, columns: Array) -> float:
-    """Return minus the restricted log likelihood, up to a constant."""
-    white = solve_triangular(lower, np.column_stack([columns, value]), lower=True)
-    orthogonal, triangle = np.linalg.qr(white[:, :-1])
-    left = white[:, -1] - orthogonal @ (orthogonal.T @ white[:, -1])
-    return float(np.log(np.diag(lower)).sum() + np.log(np.abs(np.diag(triangle)) + 1e-300).sum() + left @ left / 2)
+    found = explained(best)
+    beta = found.fit(series.value[:, None])[:, 0]
+    between, alone = float(np.exp(best[0])), float(np.exp(best[1])) if several else 0.0
+    return Fitted(beta, found.covariance, found.rows, between, alone)

@@ -10,25 +10,31 @@ import os
 import platform
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import flush
 from biodance.lab.readers import extensions
 from biodance.lab.session.recordings import RESULTS, TEXT
 from biodance.library import parse_json
-from biodance.version import __version__
+from biodance.settings import Value
+from biodance.version import NO_COMMIT, __version__, commit
 
 _MANIFEST = "manifest.json"  # Written last into a results folder
+_NONE: Mapping[str, Value] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class _Manifest:
-    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the recordings;
-    SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
+    """What a run left: ``run`` its number, ``version`` and ``commit`` of biodance ("unknown" in an installed wheel),
+    ``session`` absolute folder of the recordings, ``settings`` of the session (dotted key -> value; none where several
+    sessions or none were read); SHA-256 by name of the recordings read (``inputs``) and of the files written
+    (``outputs``).
     """
 
     run: str
@@ -36,12 +42,20 @@ class _Manifest:
     session: str
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
+    commit: str = NO_COMMIT  # the last two: not in manifests before 2026-11-29
+    settings: Mapping[str, Value] = field(default_factory=dict)
+
+    @property
+    def software(self) -> str:
+        """Which biodance it was, in words."""
+        return f"{self.version}, commit {self.commit[:12]}{self.commit[40:]}"
 
 
 @dataclass(frozen=True)
 class _Verified:
-    """A results folder beside its manifest: files of the run that are ``missing`` or ``changed``, and the recordings
-    that are not as they were read (``inputs_changed``).
+    """A results folder beside its manifest: files of the run that are ``missing`` or ``changed``, the recordings that
+    are not as they were read (``inputs_changed``), and in what the provenance in results.json says otherwise
+    (``otherwise``: "version", "commit" or "setting KEY").
     """
 
     folder: Path
@@ -49,17 +63,21 @@ class _Verified:
     missing: tuple[str, ...]
     changed: tuple[str, ...]
     inputs_changed: tuple[str, ...]
+    otherwise: tuple[str, ...] = ()
 
     @property
     def whole(self) -> bool:
-        """Whether every file of the run is there as it was written."""
-        return not (self.missing or self.changed)
+        """Whether every file of the run is there as it was written, and says what the manifest says."""
+        return not (self.missing or self.changed or self.otherwise)
 
 
-def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str]) -> None:
-    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256)."""
+def write_manifest(
+    folder: Path, session: Path, inputs: Mapping[str, str], settings: Mapping[str, Value] = _NONE
+) -> None:
+    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256) and ``settings`` (by key)."""
     outputs = {name: file_hash(folder / name) for name in _files_in(folder)}
-    one = _Manifest(uuid.uuid4().hex, __version__, str(session.absolute()), dict(inputs), outputs)
+    place, chosen = str(session.absolute()), dict(settings)
+    one = _Manifest(uuid.uuid4().hex, __version__, place, dict(inputs), outputs, commit(), chosen)
     text = json.dumps(asdict(one), indent=1, sort_keys=True)
     (folder / _MANIFEST).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
 
@@ -77,7 +95,7 @@ def read_manifest(folder: Path) -> _Manifest | None:
         return None
     try:
         found = _Manifest(**parse_json(path.read_text(encoding="utf-8")))
-        if all(isinstance(part, dict) for part in (found.inputs, found.outputs)):
+        if all(isinstance(part, dict) for part in (found.inputs, found.outputs, found.settings)):
             return found
     except (OSError, ValueError, TypeError) as error:
         raise FileRefused(f"{path}: is damaged ({error}). Run the session again.") from error
@@ -105,12 +123,60 @@ def check_results(folder: Path) -> _Verified | None:
     manifest = read_manifest(folder)
     if manifest is None:
         return None
-    there = set(_files_in(folder))
-    known = manifest.outputs
-    changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
+    missing, changed = _not_as_written(folder, manifest)
     recordings = ((Path(manifest.session) / name, sha) for name, sha in sorted(manifest.inputs.items()))
     other = (str(path) for path, sha in recordings if not path.is_file() or file_hash(path) != sha)
-    return _Verified(folder, manifest, tuple(sorted(set(known) - there)), tuple(changed), tuple(other))
+    return _Verified(folder, manifest, missing, changed, tuple(other), _said_otherwise(folder, manifest))
+
+
+def _not_as_written(folder: Path, manifest: _Manifest) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the files of a run that are missing, and those that are changed."""
+    there, known = set(_files_in(folder)), manifest.outputs
+    changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
+    return tuple(sorted(set(known) - there)), tuple(changed)
+
+
+def doubt_about(folder: Path) -> str:
+    """Return a sentence on the files of a results folder that are not as its run wrote them; "" where all are, or where
+    it has no manifest.
+    """
+    manifest = read_manifest(folder)
+    odd = sorted({*(found for some in _not_as_written(folder, manifest) for found in some)}) if manifest else []
+    return f"{folder}: not as its run wrote it: {', '.join(odd)} (see biodance verify)." if odd else ""
+
+
+def _said_otherwise(folder: Path, manifest: _Manifest) -> tuple[str, ...]:
+    """Return in what the provenance in results.json differs from the manifest; nothing where it cannot be read, which
+    is a changed file, or where either does not say.
+    """
+    try:
+        told = parse_json((folder / "results.json").read_text(encoding="utf-8"))["provenance"]
+        version, made_by, settings = told["versions"]["biodance"], told["commit"], dict(told["settings"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return ()
+    known = manifest.settings
+    differ = {"version": version != manifest.version, "commit": manifest.commit not in (NO_COMMIT, made_by)}
+    keys = sorted({*settings, *known}) if known else []
+    return (
+        *(what for what, other in differ.items() if other),
+        *(f"setting {key}" for key in keys if settings.get(key) != known.get(key)),
+    )
+
+
+def differing(found: Iterable[_Verified]) -> tuple[str, ...]:
+    """Return in what results folders differ from each other that they were made by: a sentence for the version, the
+    commit and each setting, with how many folders have which; folders that do not say are left out.
+    """
+    counts: dict[str, Counter[str]] = {}
+    for one in (each.manifest for each in found):
+        told = {"version": one.version, **({} if one.commit == NO_COMMIT else {"commit": one.commit})}
+        for key, value in (*told.items(), *((f"setting {key}", value) for key, value in one.settings.items())):
+            counts.setdefault(key, Counter())[str(value)] += 1
+    return tuple(
+        f"{key}: {', '.join(f'{value} in {count}' for value, count in sorted(some.items()))}"
+        for key, some in counts.items()
+        if len(some) > 1
+    )
 
 
 def results_below(place: Path) -> tuple[Path, ...]:
@@ -142,8 +208,9 @@ class ResultsFolder:
     place: Path
     part: Path
 
-    def finish(self, session: Path, inputs: Mapping[str, str]) -> Path | None:
-        """Bind what was written to the recordings of a ``session`` (``inputs``: name -> SHA-256) and put it in place.
+    def finish(self, session: Path, inputs: Mapping[str, str], settings: Mapping[str, Value] = _NONE) -> Path | None:
+        """Bind what was written to the recordings of a ``session`` (``inputs``: name -> SHA-256) and the ``settings``
+        (key -> value), and put it in place.
 
         Return the folder to which the files of an earlier run's folder went that were not biodance's; None if there
         were none.
@@ -154,7 +221,7 @@ class ResultsFolder:
             The disk is full, or the place cannot be written to; what was there is as before.
         """
         with _as_before(self.place):
-            write_manifest(self.part, session, inputs)
+            write_manifest(self.part, session, inputs, settings)
             (self.part / _LOCK).unlink(missing_ok=True)
             put_in_place(self.part, self.place)
             return _cleared(self.part, ours=_files_in(self.place)) if self.part.is_dir() else None
