@@ -106,7 +106,7 @@ def effects_command(name: str | None = None, *, json: JsonOption = False) -> int
         One cause only, e.g. added_mass. The values of one are written --effect NAME:target=WHERE,parameter=value.
     """
     from biodance.effects import causes
-    from biodance.report.tables.causes import CAUSE_ROW, causes_document, causes_shown
+    from biodance.report.tables.diagnosis import CAUSE_ROW, causes_document, causes_shown
     from biodance.report.terminal import print_table
 
     document = causes_document(causes(None if name is None else [name]).values())

@@ -326,14 +326,18 @@ def sit(person: Person, pose: Pose, curves: Curves, place: FootStance, hips: flo
     q[:, :3] = seat - pose.pelvis_turn @ under
     for side, leg in zip(SIDES, legs, strict=True):
         angle = np.radians(curves[f"{side}_leg"])
-        raised = np.arcsin(np.clip(pose.pelvis_turn[:, 2, 0], -1.0, 1.0))
-        least = (
-            np.arccos(np.clip(_SINKS / (person.size["thigh"] * np.maximum(np.cos(angle[:, 1]), 0.5)), -1.0, 1.0))
-            - raised
-        )
-        angle[:, 0] = np.asarray(-soft_limit(-angle[:, 0], -least, _SOFT))
+        angle[:, 0] = _on_seat(angle, pose.pelvis_turn, person.size["thigh"])
         angle = np.column_stack([angle, np.zeros(len(angle))])
         own, limits = list(leg.columns), person.body.limits
         below = soft_limit(angle, limits.upper[own], _SOFT)
         q[:, [7 + c for c in own]] = -soft_limit(-below, -limits.lower[own], _SOFT)
     return q
+
+
+def _on_seat(angle: Array, turn: Array, thigh: float) -> Array:
+    """Return the hip's flexion (T,) rad with which a knee comes no lower than the seat lets it, thighs ``thigh`` m
+    long: at adduction a and flexion f of an upright pelvis the knee is thigh cos f cos a below the hip.
+    """
+    raised = np.arcsin(np.clip(turn[:, 2, 0], -1.0, 1.0))  # the pelvis' own forward axis, over the horizontal
+    least = np.arccos(np.clip(_SINKS / (thigh * np.maximum(np.cos(angle[:, 1]), 0.5)), -1.0, 1.0)) - raised
+    return np.asarray(-soft_limit(-angle[:, 0], -least, _SOFT))
