@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joint_cases import displaced, hidden, moving, scaling
+from scipy.stats import norm
 from standing_markers import stand
 
 from biodance.body.human.measures import standing
 from biodance.motion.ik.functional_joints import functional_joints
-from biodance.motion.ik.joint_unknowns import SIZE, JointUnknowns, own_centre, own_turn
+from biodance.motion.ik.joint_unknowns import SIZE, JointUnknowns, mismarked, own_centre, own_turn
 from biodance.records import Array, Markers, Source, Trial
 
 
@@ -35,6 +36,14 @@ def elsewhere(ahead: float, turned: float) -> Array:
 def test_knees_where_they_were_marked_are_not_mentioned() -> None:
     assert knees(hidden()) == []
     assert knees(elsewhere(0.008, 0.1)) == []
+
+
+@pytest.mark.parametrize("far", [0.0, 2.0, 3.2, 3.5, 5.0])
+def test_a_knee_was_marked_elsewhere_where_that_is_more_probable_than_chance(far: float) -> None:
+    """Of a thousand knees 20 are marked elsewhere, by three times as much as the others are by chance."""
+    wrong, right = 20 * norm.pdf(far, scale=3.0), 980 * norm.pdf(far)
+    assert mismarked(far) == pytest.approx(wrong / (wrong + right))
+    assert (mismarked(far) > 0.5) == (far > 3.3)
 
 
 @pytest.mark.parametrize(("ahead", "turned"), [(-0.04, 0.0), (0.04, 0.0), (0.0, 0.9)])

@@ -11,7 +11,7 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.geometry import joint_chains
 from biodance.effects._base.words import About, CauseWords, CheckKind
-from biodance.motion.ik.joint_unknowns import MISSED
+from biodance.motion.ik.joint_unknowns import MISMARKED, MISSED
 from biodance.motion.track import track
 from biodance.records import Array
 
@@ -37,7 +37,7 @@ class JointCentre(Effect):
     """
 
     name = _NAME
-    prior = 0.02
+    prior = MISMARKED
     parameters = tuple(
         Parameter(
             f"shift_{axis}",

@@ -203,15 +203,27 @@ def own_unknowns(joint: str) -> list[int]:
     return [*range(SIZE)[own_centre(joint)], *([own_turn(joint)] if joint in HINGES else [])]
 
 
-BEYOND = 3.0
-"""Standard deviations from which a knee was not marked where it bends."""
+MISMARKED = 0.02
+"""Probability that a joint was marked elsewhere, before any movement shows it."""
+
+
+def mismarked(far: float) -> float:
+    """Return the probability that a joint was marked elsewhere that lies ``far`` standard deviations of how examiners
+    differ from its marks.
+
+    Those of marks that are wrong are `FAULTY` times as large, so that the odds are
+
+        p / (1 - p)  N(far; 0, FAULTY^2) / N(far; 0, 1),    p = `MISMARKED`.
+    """
+    odds = MISMARKED / (1 - MISMARKED) / FAULTY * np.exp(far**2 / 2 * (1 - FAULTY**-2))
+    return float(1 - 1 / (1 + odds))
 
 
 def knees_elsewhere(
     centres: Centres, theta: Array, information: Array, shown: NDArray[np.bool_], *, known: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Return a warning for every knee whose axis the movement shows elsewhere than the static trial, by more than
-    markers usually are beside it.
+    """Return a warning for every knee whose axis the movement shows elsewhere than the static trial, where it is more
+    probable than not that it was marked elsewhere.
 
     Parameters
     ----------
@@ -239,7 +251,7 @@ def knees_elsewhere(
         ahead, turned = ways @ theta
         expected = np.einsum("ki,ij,kj->k", ways[:, free], before - after, ways[:, free])
         far = float(np.max(np.abs([ahead, turned]) / np.sqrt(expected)))
-        if far > BEYOND:
+        if mismarked(far) > 0.5:
             notes.append(_warning(knee, float(ahead), float(turned), far))
     return tuple(notes)
 
