@@ -222,7 +222,7 @@ def answer(one: Diagnosis, told: Told) -> Row:
         for name, finding in zip(names, one.findings, strict=True)
         if told.right.get(name) is not None and finding.parameters
     ]
-    claims = [] if told.beside else [("nothing wrong", one.p_clean, not told.right)]
+    claims = [] if told.beside else [("nothing wrong", one.p_clean, not told.right)]  # what is beside may not matter
     for finding in (*one.findings, *one.resembles):
         alike = [f"{alias.effect} {alias.target}".strip() for alias in (finding, *finding.set)]
         true = any(told.holds(name) or {name, name.split()[0]} & allowed for name in alike)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from effect_cases import CASES
 from inferred_sessions import heard, heard_in
 from walking import MASS, STANCE, Wrong, session, standing, walk
 
@@ -122,3 +123,9 @@ def test_a_drift_moves_clocks_and_zeros_by_where_their_trial_lies(drift, steady,
     assert all(stays[trial == name].any() for name in ("first", "last", "aside"))
     for name, share in (("first", -0.4), ("last", 0.4), ("aside", 0.0)):
         np.testing.assert_allclose(grows[trial == name], share * stays[trial == name])
+
+
+def test_what_only_observations_judge_is_sized_for_the_person_too() -> None:
+    evidence, case = collect_evidence(session(standing(), walk())), CASES[1]
+    (own,) = (one.effect for one in with_observed((), evidence, effects(), of=case) if one.names == ("body_mass", ""))
+    assert own.usual == pytest.approx(0.01 * case.body.sip.mass.sum())

@@ -230,10 +230,18 @@ def serve_window(
     token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
     application = window_application(archive, token=token, port=port)
     address = f"http://127.0.0.1:{port}/?token={token}"
-    quiet: dict[str, Any] = {"log_config": None, "access_log": False, "server_header": False}
-    patience: dict[str, Any] = {"timeout_keep_alive": 30, "timeout_graceful_shutdown": 5}
-    config = uvicorn.Config(application, limit_concurrency=64, lifespan="on", **quiet, **patience)
-    server = uvicorn.Server(config)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            application,
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            timeout_keep_alive=30,
+            timeout_graceful_shutdown=5,
+            limit_concurrency=64,
+            lifespan="on",
+        )
+    )
     listener.listen()
     prepare_workers()
     tell(address)

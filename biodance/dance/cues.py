@@ -19,6 +19,7 @@ from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0  # degrees: a smaller change is not called
 _HANGING = float(np.radians(80.0))  # rad that knees are bent of somebody who has sat down
+_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight")  # as seconds are counted
 _STEP = 15.0  # degrees to which angles are rounded
 _MOST = 4  # Things that a person can begin at once
 _ALIKE = 12.0  # degrees within which right and left are called as a pair
@@ -68,8 +69,8 @@ def cue_sheet(
     words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
     they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests.
     """
-    (move, hold), names_of = tempo, ("one", "two", "three", "four", "five", "six", "seven", "eight")
-    counts = " and ".join(names_of[: max(1, min(len(names_of), round(move)))])
+    move, hold = tempo
+    counts = " and ".join(_NUMBERS[: max(1, min(len(_NUMBERS), round(move)))])
     lines = [
         "# The dance, posture by posture",
         "",
@@ -197,8 +198,10 @@ def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
     hold of at the start.
     """
     if was is None:
-        hands = "both hands" if len(now.holding) == 2 else "".join(f"the {SIDES[side]} hand" for side in now.holding)
-        return (f"hold the frame with {hands}",) if hands else ()
+        if not now.holding:
+            return ()
+        hands = "both hands" if len(now.holding) == 2 else f"the {SIDES[now.holding[0]]} hand"
+        return (f"hold the frame with {hands}",)
     if not np.array_equal(was.ankle, now.ankle):
         ahead = now.ankle[0, 0] > was.ankle[0, 0] + 1e-6
         return ("step forward with the right foot" if ahead else "set the right foot back beside the left one",)

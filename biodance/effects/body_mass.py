@@ -27,7 +27,7 @@ class BodyMass(Effect):
 
     By strides and Newton two of eight people of one laboratory weigh more than 0.7 kg otherwise than declared, and so
     does somebody in five of nine laboratories (``prior``): 1.9 kg root mean square of sixteen sessions, as three times
-    the typical size says.
+    the typical size says. ``mass`` kg of the person, to whom the typical and the usual size are in proportion.
     """
 
     mass: float = _ADULT

@@ -12,8 +12,11 @@ from biodance.records import Array
 
 _LEAST = 0.003
 """s that matter: a third of a frame at 100 Hz."""
-_RATE, _MINUTE = 0.01 / 60, 60.0
-"""s per recorded second by which clocks that are not one typically run apart, and s of a session where none is at hand.
+_MINUTE = 60.0
+"""s of a session where none is at hand."""
+_RATE = 0.01 / _MINUTE
+"""s per recorded second by which clocks that are not one typically run apart: two crystals of 50 to 100 ppm part by up
+to 6 to 12 ms a minute. That it is not more is judgement: software clocks are worse.
 """
 
 

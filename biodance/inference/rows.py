@@ -18,7 +18,7 @@ from biodance.diagnosis.candidates import Candidate, removed, slopes
 from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import Effect
+from biodance.effects import Case, Effect
 from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
@@ -159,12 +159,16 @@ def with_observed(
     evidence: ObservedEvidence,
     family: Mapping[str, object],
     problem: Problem | None = None,
+    *,
+    of: Case | None = None,
 ) -> tuple[Candidate, ...]:
     """Return the ``causes`` and those of a ``family`` that only observations judge: they leave no trace in the
-    simulation of a ``problem`` (the zero of a plate is taken off where it is empty).
+    simulation of a ``problem`` (the zero of a plate is taken off where it is empty). They are sized for the person and
+    session of a case, ``of`` where nothing is simulated; without one, as for an adult and a minute.
     """
-    kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
     known, cases = {one.names for one in causes}, () if problem is None else problem.cases
+    sized = cases[0] if cases else of
+    kinds = {name: one.sized_for(sized) if sized else one for name, one in family.items() if isinstance(one, Effect)}
     simulated = 0 if problem is None else len(problem.target)
     return (
         *causes,

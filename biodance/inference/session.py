@@ -86,7 +86,7 @@ def judge(
         known = own_noise(rows_of(seen.problem, every, known, evidence))
         rows = rows_of(seen.problem, every, known, evidence)
     else:
-        every = with_observed((), evidence, asked)
+        every = with_observed((), evidence, asked, of=seen.problem.cases[0] if seen else None)
         rows = rows_of(None, every, known, evidence)
     if seen is not None:
         bare = _with_limits(bare, seen, known, asked)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit, logit
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
@@ -215,8 +216,7 @@ def mismarked(far: float) -> float:
 
         p / (1 - p)  N(far; 0, FAULTY^2) / N(far; 0, 1),    p = `MISMARKED`.
     """
-    odds = MISMARKED / (1 - MISMARKED) / FAULTY * np.exp(far**2 / 2 * (1 - FAULTY**-2))
-    return float(1 - 1 / (1 + odds))
+    return float(expit(logit(MISMARKED) - np.log(FAULTY) + far**2 / 2 * (1 - FAULTY**-2)))
 
 
 def knees_elsewhere(
