@@ -25,6 +25,7 @@ from biodance.effects import (
     wrench_about_origin,
     wrench_about_point,
 )
+from biodance.effects.axis_error import sign_turned
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
@@ -145,6 +146,16 @@ def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
     sign = np.ones(6) - 2 * np.eye(6)[channel]
     found = discrete_effects()["axis_error"].check(session_of(on_plate(human_case(), sign)))
     assert failed(found) == [("axis_error", target)]
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.02, ("Fx",)), (2.0, ())])
+def test_no_sign_is_told_by_a_force_that_another_likely_body_would_need_the_other_way(share, told) -> None:
+    """Who bows fast moves trunk and pelvis against each other: 10 N are left of them, either way."""
+    needed = np.zeros((200, 6))
+    needed[:, 0] = 10 * np.sin(np.arange(200))
+    doubt = np.stack([share * needed, np.zeros_like(needed)], axis=2)
+    noise = np.random.default_rng(5).normal(size=needed.shape)
+    assert sign_turned(noise - needed, needed, doubt) == told
 
 
 @pytest.mark.parametrize(("channel", "target", "limit"), [(2, "Fz", 710.0), (3, "Mx", 9.0)])

@@ -9,9 +9,12 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
 from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
+from biodance.identification.posterior import prior_factor
 from biodance.lab.plates.faults import CROSSTALK, GAIN
+from biodance.motion.dynamics import regressor
 from biodance.records import CHANNELS, Array, Plate, Trial
 from biodance.spatial import wrench_about_point
+from biodance.uncertainty.caution import widened_prior
 
 ALONE = 0.95
 """Share of the vertical force that a plate must carry in the frames that judge it."""
@@ -77,8 +80,8 @@ class AxisError(DiscreteEffect):
         pairs = [pair for case in seen if (pair := on_one_plate(case, plate, centre)) is not None]
         if not pairs:
             return ()
-        measured, needed = (np.concatenate([pair[k] for pair in pairs]) for k in range(2))
-        wrong = sign_turned(measured, needed)
+        measured, needed, doubt = (np.concatenate([pair[k] for pair in pairs]) for k in range(3))
+        wrong = sign_turned(measured, needed, doubt)
         points = {name: moment_point(measured, needed, name, centre) for name in wrong}
         if not wrong:
             return (
@@ -129,10 +132,11 @@ def _beside(channel: str, point: float, sd: float) -> str:
     return f", and its moments are about a point at {along} = {point:.3f} ± {sd:.3f} m, not about the plate's centre"
 
 
-def on_one_plate(case: Case, name: str, about: Array) -> tuple[Array, Array] | None:
+def on_one_plate(case: Case, name: str, about: Array) -> tuple[Array, Array, Array] | None:
     """Return measured and needed wrench (n, 6) of a plate about the point ``about`` (3,) m where it carries the person
-    alone, less their means and what follows the needed vertical force (a centre of mass that is a little off does);
-    None without two seconds of that.
+    alone, and (n, 6, p) what a standard deviation of each direction of the body's prior adds to the needed one, less
+    their means and what follows the needed vertical force (a centre of mass that is a little off does); None without
+    two seconds of that. Only as many frames as tell something new.
     """
     plate = next((plate for plate in case.trial.plates if plate.name == name), None)
     if plate is None:
@@ -141,18 +145,34 @@ def on_one_plate(case: Case, name: str, about: Array) -> tuple[Array, Array] | N
     alone = (own[:, 2] > ALONE * total) & (own[:, 2] > 0.5 * needed[:, 2]) & np.isfinite(own).all(axis=1)
     if alone.sum() < _SECONDS * case.motion.rate:
         return None
-    measured, needed = (wrench_about_point(value[alone], about) for value in (own, needed))
-    nuisance = np.stack([np.ones(alone.sum()), needed[:, 2]], axis=1)
-    both = np.hstack([measured, needed])
-    rest = both - nuisance @ np.linalg.lstsq(nuisance, both, rcond=None)[0]
-    return rest[:, :6], rest[:, 6:]
+    used = np.flatnonzero(alone)[:: round(1 / _ANEW)]
+    doubt = regressor(case.body, case.motion.at(used)) @ prior_factor(widened_prior(case.body.sip))
+    rows = np.concatenate([own[used][:, None], needed[used][:, None], doubt.swapaxes(1, 2)], axis=1)
+    flat = wrench_about_point(rows, about).reshape(len(used), -1)
+    nuisance = np.stack([np.ones(len(used)), needed[used, 2]], axis=1)
+    rest = (flat - nuisance @ np.linalg.lstsq(nuisance, flat, rcond=None)[0]).reshape(rows.shape)
+    return rest[:, 0], rest[:, 1], rest[:, 2:].swapaxes(1, 2)
 
 
-def sign_turned(measured: Array, needed: Array) -> tuple[str, ...]:
-    """Return the channels of ``measured`` (n, 6) that agree with ``needed`` (n, 6) only once their sign is turned."""
-    as_is, turned = np.sum((measured - needed) ** 2, axis=0), np.sum((measured + needed) ** 2, axis=0)
-    wrong = (needed.std(axis=0) > MOVING) & (turned < MIRRORED * as_is)
+def sign_turned(measured: Array, needed: Array, doubt: Array) -> tuple[str, ...]:
+    """Return the channels of ``measured`` (n, 6) that agree with ``needed`` (n, 6) only once their sign is turned,
+    whatever body within its ``doubt`` (n, 6, p) needs it: segments that move against each other leave a force that
+    hangs on how the mass is shared between them.
+    """
+    wrong = [
+        bool(needed[:, k].std() > noise)
+        and _misfit(-measured[:, k] - needed[:, k], doubt[:, k], noise)
+        < MIRRORED * _misfit(measured[:, k] - needed[:, k], doubt[:, k], noise)
+        for k, noise in enumerate(MOVING)
+    ]
     return tuple(name for name, bad in zip(CHANNELS, wrong, strict=True) if bad)
+
+
+def _misfit(left: Array, doubt: Array, noise: float) -> float:
+    """Return min over u of |left - doubt u|^2 / noise^2 + |u|^2: what no likely body explains of ``left`` (n,)."""
+    inner = np.eye(doubt.shape[1]) * noise**2 + doubt.T @ doubt
+    across = doubt.T @ left
+    return float(left @ left - across @ np.linalg.solve(inner, across)) / noise**2
 
 
 def moment_point(measured: Array, needed: Array, channel: str, centre: Array) -> tuple[float, float]:
@@ -171,7 +191,7 @@ def moment_point(measured: Array, needed: Array, channel: str, centre: Array) ->
     rest = left - ratio * force
     if not rest @ rest < MIRRORED * (left @ left):
         return np.nan, np.nan
-    sd = float(np.sqrt(rest @ rest / (len(rest) * _ANEW) / (force @ force)))
+    sd = float(np.sqrt(rest @ rest / len(rest) / (force @ force)))
     return float(centre[axis]) + share * ratio, abs(share) * sd
 
 
