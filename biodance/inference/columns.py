@@ -61,6 +61,12 @@ class VisibleColumns:
         X = rows.X @ turn
         return cls(rows, X, np.array(group, dtype=int), turn, _within(rows, X, X))
 
+    def only(self, where: slice) -> NDArray[np.intp]:
+        """Return the indices of the columns that hold coefficients ``where`` of `Rows.X` and no others."""
+        here = np.flatnonzero(self.turn[where].any(axis=0))
+        beside = np.delete(self.turn[:, here], where, axis=0).any(axis=0)
+        return np.asarray(here[~beside])
+
     @cached_property
     def plates(self) -> Array:
         """(K, K) products of the columns in all rows of the plates."""

@@ -39,6 +39,7 @@ FLOOR = -0.3
 CONVERGED = 0.02
 """Change of the logarithm of a scale below which its search ends."""
 _STEPS, _FAR = 12, 0.7
+_NONE = np.empty(0, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ class Scales:
 class Products:
     """Inner products of columns and target, all that the posterior needs: ``plates`` and ``markers`` (K + 1, K + 1)
     with the target last, ``observed`` (n, K + 1) the observations' rows, of which only the columns ``used`` are not
-    zero; ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale.
+    zero; ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale; ``without`` indices of columns
+    that do not count.
     """
 
     plates: Array
@@ -70,6 +72,7 @@ class Products:
     used: NDArray[np.intp]
     count: int
     group: NDArray[np.intp]
+    without: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +137,9 @@ def nominal(rows: Rows) -> Scales:
     return Scales(np.zeros(len(rows.groups)), 0.0, np.ones(len(rows.y) - rows.simulated))
 
 
-def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array) -> Products:
-    """Return the inner products of all ``columns``, further ones ``Z`` (r, p) of fixed scale and the target ``y`` (r,),
-    where rows of the plates are scaled by that of ``sure`` (Q + 1,) for their band and channel.
+def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: NDArray[np.intp] = _NONE) -> Products:
+    """Return the inner products of all ``columns`` but those ``without``, further ones ``Z`` (r, p) of fixed scale and
+    the target ``y`` (r,), where rows of the plates are scaled by that of ``sure`` (Q + 1,) for their band and channel.
     """
     rows, X, square = columns.rows, columns.X, sure**2
     n, r, K = rows.plates, rows.simulated, X.shape[1]
@@ -154,7 +157,8 @@ def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array) -> Produc
     markers = put(columns.inner[-1], slice(n, r))
     observed = np.concatenate([X[r:], tail[r:]], axis=1)
     used = np.flatnonzero(observed.any(axis=0))
-    return Products(plates, markers, observed, used, n, np.append(columns.group, np.full(Z.shape[1], -1)))
+    group = np.append(columns.group, np.full(Z.shape[1], -1))
+    return Products(plates, markers, observed, used, n, group, without)
 
 
 def bare(columns: VisibleColumns) -> Products:
@@ -185,6 +189,7 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     """Return the posterior under given scales, with its evidence."""
     K = found.group.size
     size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
+    size[found.without] = 0.0
     loud = np.exp(-2 * at.noise)
     whole = found.plates * loud + found.markers
     seen = found.observed[:, found.used]

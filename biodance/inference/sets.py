@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, log_priors
@@ -188,12 +189,13 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
         return Hypothesis((), columns, search.start, search.start.log_evidence, Z, rows.y, sure)
     u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
     at, effects = start or search.start.scales, tuple(one.effect for one in causes)
+    without = _own_tolerances(search, effects)
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
         slopes = [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes]
         Z = np.concatenate(slopes, axis=1)
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
-        found = posterior(products(columns, Z, y, sure), prior_sd(rows), at)
+        found = posterior(products(columns, Z, y, sure, without), prior_sd(rows), at)
         u, C = found.last(u0.size)
         causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
         one = Hypothesis(causes, columns, found, -np.inf, Z, y, sure)
@@ -203,6 +205,16 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
     value = found.log_evidence + one.log_sure + sum(search.prior[c.names] for c in causes)
     possible = all(rows.possible(c.effect, c.theta) for c in causes)
     return replace(one, log_posterior=value) if possible else one
+
+
+def _own_tolerances(search: Search, effects: Sequence[Effect]) -> NDArray[np.intp]:
+    """Return the columns that are tolerances of ``effects`` of which twice the size is not twice the change: the
+    tolerance is written for sizes near none, and a cause of the opposite size beside it would be a filter of the
+    forces. The slab of the cause, three times as wide at least, stands for both.
+    """
+    curved = [one for one in effects if not one.linear]
+    found = (search.rows.tolerated.get((one.name, one.target), (slice(0),))[0] for one in curved)
+    return np.concatenate([np.empty(0, dtype=np.intp), *(search.columns.only(where) for where in found)])
 
 
 def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCause, ...]:
@@ -232,7 +244,7 @@ def unlike_models(one: Hypothesis, effects: Sequence[Effect], taken: Sequence[Ar
 
 def at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
     """Return a hypothesis under other scales."""
-    found = posterior(products(search.columns, base.Z, base.y, base.sure), prior_sd(search.rows), scales)
+    found = posterior(base.fit.products, prior_sd(search.rows), scales)
     value = base.log_posterior - base.fit.log_evidence + found.log_evidence
     return replace(base, fit=found, log_posterior=value)
 
