@@ -268,3 +268,21 @@ def test_who_is_heavier_than_declared_may_carry_a_load_where_only_weights_are_se
     weighed = standing(weight=1.05 * MASS)
     (one,) = heard(session(weighed, replace(weighed, name="later"))).diagnosis.findings
     assert ("added_mass", "") in {(alias.effect, alias.target) for alias in one.set}
+
+
+def test_a_delay_and_its_opposite_tolerance_are_no_filter_of_the_forces() -> None:
+    """Forces that are smoothed otherwise than the movement: late by 17 ms and early by as much, to first order, are a
+    second derivative, and no delay.
+    """
+
+    def smoothed(wrench, session, moving):
+        return wrench - 0.017**2 * np.gradient(np.gradient(wrench, moving.time, axis=0), moving.time, axis=0)
+
+    tolerances = replace(known(), sizes={**known().sizes, "time_delay": 0.005})
+    found = inferred(body(), windows(3, trials=2, hidden=smoothed), tolerances=tolerances, effects=("time_delay",))
+    (delay,) = (one.effect for one in found.search.causes if one.names == ("time_delay", ""))
+    one = hypothesis(found.search, (NamedCause(delay, np.array([0.03]), np.empty((0, 0))),))
+    (none,) = (h for h in found.posterior.hypotheses if not h.causes)
+    assert one.log_posterior < none.log_posterior
+    assert abs(one.causes[0].theta[0]) < 0.003
+    np.testing.assert_array_equal(one.whole(one.causes[0]), one.causes[0].theta)
