@@ -214,7 +214,7 @@ def _may_explain(
     named = np.sum([misfit(one, {}) for one in touched], axis=0)
     with np.errstate(invalid="ignore"):
         least = np.sum([one.least_misfit(apart, one.columns(names, other)) for one in touched], axis=0)
-        return np.count_nonzero(least < _BETTER * named) >= LEAST_EXCHANGED
+        return bool(np.sum(least < _BETTER * named) >= LEAST_EXCHANGED)
 
 
 def _explained(misfit: _Misfit, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]) -> tuple[Mask, Mask, Array]:
