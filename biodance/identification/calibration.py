@@ -18,7 +18,7 @@ from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_room
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
-from biodance.identification.placement import Tables, more_probable_table
+from biodance.identification.placement import PossibleTables, more_probable_table
 from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import PAIRS, Statistics
 from biodance.records import Array, Sip
@@ -138,7 +138,13 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
 
 
 def undo_dilution(
-    body: Body, total: Statistics, measured: Calibrated, found: Mismatch, tables: Tables, room: Sip, loads: Array
+    body: Body,
+    total: Statistics,
+    measured: Calibrated,
+    found: Mismatch,
+    tables: PossibleTables,
+    room: Sip,
+    loads: Array,
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where
     that moves a mass by more than its intervals can bear. ``tables`` as they may be before the data; ``loads`` the

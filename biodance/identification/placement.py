@@ -93,12 +93,12 @@ def _has_open_limb(table: Sip) -> bool:
     return any(spread[name] > _OPEN * spread.get(other_side(name), np.inf) for name in spread)
 
 
-Tables = Mapping[tuple[bool, bool], Sip]
+PossibleTables = Mapping[tuple[bool, bool], Sip]
 """What may be known before the data, by whether the trunk's matter lies along with the joint, and the sides are
 apart."""
 
 
-def possible_tables(table: Sip, body: Body) -> Tables:
+def possible_tables(table: Sip, body: Body) -> PossibleTables:
     """Return the ``table`` with the trunk's matter and the sides as they may be. Where a limb is open, the sides are
     not asked for.
     """
@@ -109,7 +109,7 @@ def possible_tables(table: Sip, body: Body) -> Tables:
     return {(x, s): with_sides(one, apart=True) if s else one for x, one in placed.items() for s in sides}
 
 
-def more_probable_table(data: Information, tables: Tables, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
+def more_probable_table(data: Information, tables: PossibleTables, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
     """Return the one of the ``tables`` of ``body`` that the ``data`` of the session make most probable (evidence under
     the table's own standard deviations and those of the trunk's place), whether the sides are apart in it, and both in
     words.
