@@ -15,6 +15,7 @@ from human_cases import human_case
 from lab_sessions import person
 
 from biodance.effects import Recorded
+from biodance.effects._base.rigid_groups import RigidGroup
 from biodance.effects._base.wrists import back_of_hand, middle
 from biodance.effects.labels_swapped import LabelsSwapped, exchanges, refuted, renamed
 from biodance.errors import FileRefused
@@ -56,6 +57,19 @@ def visit(*, speed: float) -> tuple[Trial, Trial]:
         source = Source(Path(f"{role}.c3d"), "", "C3D", 100.0)
         trials.append(Trial(role, role, Markers(markers.names, markers.time, xyz), (), source, "plug_in_gait"))
     return trials[0], trials[1]
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_distances_alone_say_how_well_a_shape_can_fit_at_best(count: int) -> None:
+    rng = np.random.default_rng(count)
+    shape, xyz = rng.normal(size=(count, 3)), rng.normal(size=(50, count, 3))
+    group = RigidGroup(tuple("abcd"[:count]), shape - shape.mean(axis=0))
+    markers = Markers(group.labels, np.arange(50) / 100, xyz)
+    misfit = group.misfit(markers, {}, np.arange(50))
+    least = group.least_misfit(np.linalg.norm(xyz[:, :, None] - xyz[:, None], axis=3), list(range(count)))
+    assert (least <= misfit + 1e-12).all()
+    if count == 2:  # each takes half of the way
+        np.testing.assert_allclose(least, misfit, atol=1e-12)
 
 
 @pytest.mark.parametrize("pairs", [(("LKNE", "RKNE"),), (("LWRA", "LWRB"),), (("RWRA", "RWRB"),), HEAD])

@@ -10,7 +10,7 @@ from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.learning import learn_noise
 from biodance.identification.load_posterior import MASSES, LoadPosterior
-from biodance.identification.loads import compact_load, load_moments, with_unknown_load
+from biodance.identification.loads import compact_load, load_moments, unknown_loads, with_room
 from biodance.identification.statistics import layout_for, standing_point, statistics
 from biodance.identification.unloaded_body import whiten_innovation
 from biodance.records import Sip
@@ -85,7 +85,10 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
         fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
         data = statistics(body, fit, layout_for(standing_point((fit,))))
         slow.append(
-            [learn_noise(data, prior)[0].covariance[0][2, 2] for prior in (with_unknown_load(body, body.sip), body.sip)]
+            [
+                learn_noise(data, prior).covariance[0][2, 2]
+                for prior in (with_room(body.sip, unknown_loads(body)), body.sip)
+            ]
         )
     assert slow[1][0] < 3 * slow[0][0]
     assert slow[1][1] > 3 * slow[1][0]

@@ -14,7 +14,7 @@ from biodance.identification.identification import identify_body
 from biodance.identification.information import Information
 from biodance.identification.loads import compact_load
 from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
+from biodance.identification.statistics import PAIRS, Fit, Statistics, layout_for, statistics
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 from biodance.uncertainty.bands import BANDS
@@ -52,14 +52,14 @@ def shaken() -> Statistics:
 def left(total: Statistics, phi: Array) -> Array:
     """Return (B, 6): summed squares of what the parameters do not explain of the wrench."""
     z = np.append(-phi, 1.0)
-    return np.asarray(np.einsum("i,bcicj,j->bc", z, total.gram, z))
+    return np.asarray(np.einsum("i,bcij,j->bc", z, total.own, z))
 
 
 def slopes(total: Statistics, phi: Array) -> tuple[Array, Array]:
     """Return (B, 6) twice: how much of the predicted wrench the plates show, and what is left of theirs beside that."""
     predicted, seen = np.append(phi, 0.0), np.eye(phi.size + 1)[-1]
     cross, size, power = (
-        np.einsum("i,bcicj,j->bc", one, total.gram, other)
+        np.einsum("i,bcij,j->bc", one, total.own, other)
         for one, other in ((seen, predicted), (predicted, predicted), (seen, seen))
     )
     return cross / size, power - cross**2 / size
@@ -95,7 +95,7 @@ def test_no_gain_shows_to_which_side_of_a_joint_matter_belongs(shaken: Statistic
     moved[10 * pelvis : 10 * pelvis + 10] = point
     alone, moved[10 * BODY.segment_index("right_thigh")] = moved.copy(), -1.0
     real = undiluted(shaken, BODY.sip.phi, shaken.information(NOISE), TABLE)
-    seen = [np.einsum("i,bcicj,j->bc", n, real.gram[:, :, :-1, :, :-1], n).sum() for n in (moved, alone)]
+    seen = [np.einsum("i,bcij,j->bc", n, real.own[:, :, :-1, :-1], n).sum() for n in (moved, alone)]
     assert seen[0] < 1e-10 * seen[1]
 
 
@@ -123,9 +123,10 @@ def test_segments_of_no_person_are_left_alone(shaken: Statistics) -> None:
     table = replace(TABLE, segments=tuple(f"link_{i}" for i in range(len(BODY.segments))))
     same, size = (
         undiluted(shaken, BODY.sip.phi, shaken.information(NOISE), table),
-        np.sqrt(np.einsum("bcici->bci", shaken.gram)),
+        np.sqrt(np.einsum("bcii->bci", shaken.own)),
     )
-    off = (same.gram - shaken.gram) / np.maximum(np.sqrt(size[..., None, None] * size[:, None, None]), 1e-9)
+    first, second = (size[:, pair] for pair in PAIRS)
+    off = (same.gram - shaken.gram) / np.maximum(np.sqrt(first[..., None] * second[:, :, None]), 1e-9)
     np.testing.assert_allclose(off, 0.0, atol=1e-6)
 
 

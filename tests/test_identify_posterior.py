@@ -9,7 +9,7 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.parts import pseudo_inertia, smallest_eigenvalues
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import find_posterior
+from biodance.identification.posterior import find_posterior, mean_and_covariance
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
@@ -42,6 +42,9 @@ def test_posterior_equals_the_textbook_formula() -> None:
     mean = covariance @ (np.linalg.inv(prior.covariance) @ prior.phi + W.T @ y)
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(found.mean, mean, rtol=1e-6, atol=1e-9)
+    rows = np.column_stack([W, y])
+    for one, other in zip(mean_and_covariance(rows.T @ rows, prior), (mean, covariance), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
 def test_intervals_cover_the_truth() -> None:

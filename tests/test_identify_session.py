@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import NOISE_ALONE, conclude, identify_body
 from biodance.identification.knowledge import knowledge, segment_quantities
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import compact_load, with_unknown_load
+from biodance.identification.loads import compact_load, unknown_loads, with_room
 from biodance.identification.sessions import differences
 from biodance.identification.statistics import layout_for, standing_point, statistics
 from biodance.identification.validation import residual_ratio, validate
@@ -207,7 +207,7 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
-    noise, _ = learn_noise(total, with_unknown_load(body, widened_prior(body.sip)))
+    noise = learn_noise(total, with_room(widened_prior(body.sip), unknown_loads(body)))
     np.testing.assert_allclose(
         conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi
     )

@@ -20,7 +20,7 @@ from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.information import Information
 from biodance.identification.limbs import segments_beyond, with_declared_limbs, with_open_limb
-from biodance.identification.placement import more_probable_table
+from biodance.identification.placement import more_probable_table, possible_tables
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.accepted import write_corrected
@@ -62,7 +62,8 @@ def test_a_prosthesis_is_open_below_its_joint_and_all_else_stays_known():
     assert now == pytest.approx(sure, abs=1e-9)  # what the whole body weighs is as known as before
     table = widened_prior(open_.sip)
     for one, sides in ((table, False), (widened_prior(plain.sip), True)):  # where a limb is open, nobody asks
-        assert more_probable_table(unequal_thighs(plain), one, replace(plain, at_joint=None))[1] is sides
+        alone = replace(plain, at_joint=None)
+        assert more_probable_table(unequal_thighs(plain), possible_tables(one, alone), alone)[1] is sides
 
 
 def test_what_is_worn_is_known_and_the_person_is_lighter_by_it():

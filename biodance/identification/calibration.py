@@ -8,7 +8,7 @@ Measurement Error in Nonlinear Models, doi:10.1201/9781420010138). The gain is m
 show of the wrench that trunk, legs and arms are predicted to need, band by band and channel by channel.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import with_unknown_load
+from biodance.identification.loads import with_room
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
-from biodance.identification.placement import more_probable_table
+from biodance.identification.placement import PossibleTables, more_probable_table
 from biodance.identification.posterior import BodyPosterior, find_posterior
-from biodance.identification.statistics import Statistics
+from biodance.identification.statistics import PAIRS, Statistics
 from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
 
@@ -58,11 +58,11 @@ def undiluted(total: Statistics, phi: Array, known: Information, table: Sip) -> 
     learned, gram = _learned(known, table), np.array(total.gram)
     for band in np.flatnonzero((np.array(total.layout.bands.edges[:-1]) >= _FAST) & (total.count > 0)):
         turn = np.zeros((6, *learned.shape))
-        for channel in range(6):
-            gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
+        for channel, square in enumerate(total.own[band]):
+            gain = _gains(square, parts * phi, int(total.count[band]))
             lost = np.append(np.where(parts.any(axis=0), gain @ parts - 1.0, 0.0), 0.0)
             turn[channel] = np.eye(len(lost)) + lost[:, None] * learned
-        gram[band] = np.einsum("cia,cidj,djb->cadb", turn, gram[band], turn, optimize=True)
+        gram[band] = turn[PAIRS[0]].swapaxes(1, 2) @ gram[band] @ turn[PAIRS[1]]
     return Statistics(gram, total.count, total.layout)
 
 
@@ -130,7 +130,7 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
     """Return the data of ``total`` whitened by ``noise``, less what twins and plates disturb (``found``), sizes chosen
     by evidence under the table ``room`` that may carry a load.
     """
-    data = replace(total).information(noise)  # a copy of its own, see `learn_noise`
+    data = total.information(noise)
     if found is None:
         return Calibrated(data, Sizes(0.0, 1.0), noise)
     sizes = evident_sizes(data, found, room)
@@ -138,26 +138,32 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
 
 
 def undo_dilution(
-    body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, room: Sip, *, open_table: bool
+    body: Body,
+    total: Statistics,
+    measured: Calibrated,
+    found: Mismatch,
+    tables: PossibleTables,
+    room: Sip,
+    loads: Array,
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where
-    that moves a mass by more than its intervals can bear. ``before`` is the table, whose open questions the data answer
-    if ``open_table``; ``room`` the same that may carry a load.
+    that moves a mass by more than its intervals can bear. ``tables`` as they may be before the data; ``loads`` the
+    covariance (p, p) of those that nobody declared, ``room`` the table that may carry them.
     """
-    now, known = measured, replace(total).information(measured.noise)
+    now, known = measured, total.information(measured.noise)
     for _ in range(_ROUNDS):
-        table = more_probable_table(now.data, before, body)[0] if open_table else before
+        table, _, _ = more_probable_table(now.data, tables, body)
         posterior = find_posterior(now.data, table)
-        real = undiluted(total, _with_probable_load(posterior, now.data, body).mean, known, table)
-        now = discounted(real, learn_noise(real, room, rounds=_AGAIN)[0], found, room)
+        real = undiluted(total, _with_probable_load(posterior, now.data, loads).mean, known, table)
+        now = discounted(real, learn_noise(real, room, rounds=_AGAIN), found, room)
         if gains_move_masses(posterior, find_posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
     return now
 
 
-def _with_probable_load(posterior: BodyPosterior, data: Information, body: Body) -> BodyPosterior:
+def _with_probable_load(posterior: BodyPosterior, data: Information, loads: Array) -> BodyPosterior:
     """Return the posterior with a load where the data make one more probable: arms that are too light for what they
     carry show more than is predicted, and no dilution.
     """
-    loaded = find_posterior(data, with_unknown_load(body, posterior.prior))
+    loaded = find_posterior(data, with_room(posterior.prior, loads))
     return max(posterior, loaded, key=lambda one: one.log_evidence)

@@ -18,10 +18,10 @@ from biodance.identification.calibration import discounted, undo_dilution
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_interval, known_together
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import with_unknown_load
+from biodance.identification.loads import unknown_loads, with_room
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.placement import more_probable_table
+from biodance.identification.placement import more_probable_table, possible_tables
 from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics_together, usable
 from biodance.records import Sip
@@ -229,12 +229,11 @@ def conclude_trials(
     Where movement is so slow that what its fastest band shows cannot be told from noise in the kinematics (regression
     dilution that cannot be given back, `dilution.gains_move_masses`), that band is left out.
     """
-    room = with_unknown_load(body, prior or widened_prior(body.sip, body.joint_errors))
+    room = with_room(prior or widened_prior(body.sip, body.joint_errors), unknown_loads(body))
     softer = softness(body, fits, total.layout.bands)
 
     def concluded(some: Statistics) -> Identification:
-        noise, _ = learn_noise(some, room)
-        names = tuple(fit.name for fit in fits)
+        noise, names = learn_noise(some, room), tuple(fit.name for fit in fits)
         return conclude(body, some, names, noise=noise, found=mismatch(body, fits, noise, softer=softer), prior=prior)
 
     found = concluded(total)
@@ -261,12 +260,13 @@ def conclude(
     noise alone, far too short, and the notes say so.
     """
     before = prior or widened_prior(body.sip, body.joint_errors)
-    room = before if machine else with_unknown_load(body, before)
-    got = discounted(total, noise or learn_noise(total, room)[0], found, room)
+    tables, loads = possible_tables(before, body) if prior is None else {(False, False): before}, unknown_loads(body)
+    room = before if machine else with_room(before, loads)
+    got = discounted(total, noise or learn_noise(total, room), found, room)
     if found is not None and not machine:
-        got = undo_dilution(body, total, got, found, before, room, open_table=prior is None)
+        got = undo_dilution(body, total, got, found, tables, room, loads)
     data = got.data
-    before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
+    before, apart, chosen = more_probable_table(data, tables, body)
     posterior = find_posterior(data, before)
     fit = physical_fit(posterior, body)
     base = estimate_base(data, structural_base(body))

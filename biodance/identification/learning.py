@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.identification.posterior import BodyPosterior, find_posterior
+from biodance.identification.posterior import mean_and_covariance
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
@@ -22,18 +22,14 @@ _SETTLED = 1e-3
 
 
 @one_thread()
-def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array = START) -> tuple[Noise, BodyPosterior]:
-    """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
-    beyond a thousandth; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
+def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array = START) -> Noise:
+    """Return the noise of the session, after at most ``rounds`` or once nothing changes beyond a thousandth; ``start``
+    (6, 6) N², N·m, N²·m² as for people by default.
     """
-    data = replace(data)  # a copy of its own: what that keeps in order to learn (12 MB) goes with it
 
     def improved(noise: Noise) -> Noise:
-        posterior = find_posterior(data.information(noise), prior)
-        return replace(
-            noise, covariance=noise_of(data.moments(posterior.mean, posterior.covariance), start=start, worth=WORTH)
-        )
+        moments = data.moments(*mean_and_covariance(data.normal_matrix(noise), prior))
+        return replace(noise, covariance=noise_of(moments, start=start, worth=WORTH))
 
     first = Noise(np.tile(start, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
-    noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=_SETTLED)
-    return noise, find_posterior(data.information(noise), prior)
+    return maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=_SETTLED)

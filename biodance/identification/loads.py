@@ -59,18 +59,23 @@ def _factor(moment: Array) -> Array:
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
 
 
-def with_unknown_load(body: Body, prior: Sip, *, share: Array | None = None) -> Sip:
-    """Return ``prior`` with a covariance that leaves room for an undeclared load on every segment.
-
-    ``share`` (N,) of a load's second moment for every segment, by default `UNDECLARED`. Noise is learned under it: with
-    the total mass pinned to the declared one, a load would pass for slow noise.
+def unknown_loads(body: Body, *, share: Array | None = None) -> Array:
+    """Return the covariance (10N, 10N) that an undeclared load on every segment adds; ``share`` (N,) of a load's second
+    moment for every segment, by default `UNDECLARED`.
     """
-    room = np.full(len(prior.segments), UNDECLARED) if share is None else share
-    covariance = np.array(prior.covariance)
-    for i in range(len(prior.segments)):
+    room = np.full(len(body.segments), UNDECLARED) if share is None else share
+    covariance = np.zeros((10 * len(room), 10 * len(room)))
+    for i in range(len(body.segments)):
         U = load_moments(body, i)
-        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += room[i] * U @ U.T
-    return Sip(prior.segments, prior.phi, covariance)
+        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = room[i] * U @ U.T
+    return covariance
+
+
+def with_room(prior: Sip, loads: Array) -> Sip:
+    """Return ``prior`` with a covariance that leaves room for `unknown_loads`. Noise is learned under it: with the
+    total mass pinned to the declared one, a load would pass for slow noise.
+    """
+    return Sip(prior.segments, prior.phi, prior.covariance + loads)
 
 
 _FRAMES = 50

@@ -167,10 +167,11 @@ def evident_sizes(data: Information, found: Mismatch, prior: Sip) -> Sizes:
     basis = (vector[:, keep] / np.sqrt(value[keep])).T / scale
     e = basis @ (data.triangle.T @ (data.target - data.triangle @ prior.phi))
     spread = basis @ H @ prior.covariance @ H @ basis.T
-    parts = [basis @ covariance(H, found, Sizes(k, 0.0)) @ basis.T for k in KINEMATICS]
+    moved, wrong = (basis @ scores for scores in (found.kinematics, found.plates))
+    M, P = moved @ moved.T, spread + wrong @ wrong.T
     best, chosen = -np.inf, Sizes(1.0, 1.0)
-    for part, kinematics in zip(parts, KINEMATICS, strict=True):
-        value, vector = np.linalg.eigh(spread + part)
+    for kinematics in KINEMATICS:
+        value, vector = np.linalg.eigh(kinematics**2 * M + P)
         turned = (vector.T @ e) ** 2
         for noise in _NOISE:
             likely = -0.5 * float(np.sum(np.log(value + noise) + turned / (value + noise)))

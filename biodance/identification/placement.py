@@ -4,8 +4,8 @@ the joint), and whether the masses of the two sides are alike or each on its own
 probable one is kept.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
@@ -93,21 +93,33 @@ def _has_open_limb(table: Sip) -> bool:
     return any(spread[name] > _OPEN * spread.get(other_side(name), np.inf) for name in spread)
 
 
-def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
-    """Return the ``table`` with the trunk's matter and the sides as the ``data`` of the session make more probable
-    (evidence under the table's own standard deviations and those of the trunk's place), whether the sides are apart in
-    it, and both in words. Where a limb is open, the sides are not asked for.
+PossibleTables = Mapping[tuple[bool, bool], Sip]
+"""What may be known before the data, by whether the trunk's matter lies along with the joint, and the sides are
+apart."""
+
+
+def possible_tables(table: Sip, body: Body) -> PossibleTables:
+    """Return the ``table`` with the trunk's matter and the sides as they may be. Where a limb is open, the sides are
+    not asked for.
     """
-    places = (False, True) if body.at_joint is not None else (False,)
-    placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
+    placed = {False: table}
+    if body.at_joint is not None:
+        placed = {along: _at(body, float(table.mass.sum()), along=along) for along in (False, True)}
     sides = (False,) if _has_open_limb(table) else (False, True)
-    choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, sides)}
-    evidence = {choice: find_posterior(data, one).log_evidence for choice, one in choices.items()}
+    return {(x, s): with_sides(one, apart=True) if s else one for x, one in placed.items() for s in sides}
+
+
+def more_probable_table(data: Information, tables: PossibleTables, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
+    """Return the one of the ``tables`` of ``body`` that the ``data`` of the session make most probable (evidence under
+    the table's own standard deviations and those of the trunk's place), whether the sides are apart in it, and both in
+    words.
+    """
+    evidence = {choice: find_posterior(data, one).log_evidence for choice, one in tables.items()}
     along, apart = best = max(evidence, key=lambda choice: evidence[choice] - ODDS * choice[1])
     words = []
-    if len(places) > 1:
+    if (not along, apart) in tables:
         trunk, gain = body.segment_index("trunk_head"), evidence[best] - evidence[not along, apart]
-        off = 1e3 * float(np.linalg.norm((placed[1].com - placed[0].com)[trunk]))
+        off = 1e3 * float(np.linalg.norm((tables[True, apart].com - tables[False, apart].com)[trunk]))
         where = "is taken along with the joint" if along else "stays where the table has it"
         if off >= _TOLD:
             words.append(
@@ -119,4 +131,4 @@ def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip,
             f"The masses of the right and left side are taken each on its own, not as alike as the table expects "
             f"(logarithm of the Bayes factor {evidence[best] - evidence[along, False]:.1f})."
         )
-    return choices[best], apart, tuple(words)
+    return tables[best], apart, tuple(words)

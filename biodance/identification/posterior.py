@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from biodance.identification.information import Information
 from biodance.records import Array, Sip
@@ -70,6 +70,17 @@ def _factor_of(covariance: bytes) -> Array:
     factor = scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
     factor.setflags(write=False)
     return np.asarray(factor)
+
+
+def mean_and_covariance(normal: Array, prior: Sip) -> tuple[Array, Array]:
+    """Return posterior mean (p,) and covariance (p, p) after whitened data of the ``normal`` matrix [W y]'[W y] (p + 1,
+    p + 1): what `find_posterior` returns, as exact as that matrix is.
+    """
+    S = prior_factor(prior)
+    lower = cholesky(S.T @ normal[:-1, :-1] @ S + np.eye(S.shape[1]), lower=True, check_finite=False)
+    told = S.T @ (normal[:-1, -1] - normal[:-1, :-1] @ prior.phi)
+    half = solve_triangular(lower, S.T, lower=True, check_finite=False)
+    return prior.phi + S @ cho_solve((lower, True), told, check_finite=False), half.T @ half
 
 
 def find_posterior(data: Information, prior: Sip) -> BodyPosterior:

@@ -82,7 +82,7 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
     fits, about, notes = usable(body, tuple(one.fit for one in trials))
     layout = layout_for(about, _BANDS)
     total = statistics_together(body, fits, layout)
-    noise, _ = learn_noise(total, body.sip, start=robot_start(body))
+    noise = learn_noise(total, body.sip, start=robot_start(body))
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
     done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)

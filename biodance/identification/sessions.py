@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError, NotSolved
 from biodance.identification.added_mass import added_mass
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
-from biodance.identification.loads import with_unknown_load
+from biodance.identification.loads import unknown_loads, with_room
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.unloaded_body import scaled_to_mass, table_like
@@ -118,4 +118,4 @@ def _with_room(table: Sip, one: Identification, other: Identification) -> BodyPo
     """
     chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
     share = np.array([chance[segment] for segment in one.body.segments])
-    return find_posterior(one.data, with_unknown_load(one.body, table, share=share))
+    return find_posterior(one.data, with_room(table, unknown_loads(one.body, share=share)))

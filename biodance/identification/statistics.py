@@ -4,7 +4,6 @@ memory.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,14 +54,15 @@ class Fit:
             raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
 
 
-_PAIRS = np.triu_indices(6)
-"""Pairs of channels, each once."""
+PAIRS = np.triu_indices(6)
+"""Pairs of channels, each once: first and second (21,)."""
+_OWN = PAIRS[0] == PAIRS[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,)
-    coefficients.
+    """``gram`` (B, 21, p + 1, p + 1) second moments of [W y] per band and pair of channels (`PAIRS`), wrench about
+    ``layout.about``; ``count`` (B,) coefficients.
 
     ``layout`` carries bands, rate and point; its covariance is the identity (nothing is whitened yet).
     """
@@ -85,11 +85,11 @@ class Statistics:
         """Add the second moments of ``rows`` (T, 6, p + 1) of [W y] at ``rate`` Hz in the first ``bands``, by default
         all, to the arrays.
         """
-        X, size = self.layout.bands.coefficients(self.layout.shift @ rows), self.gram.shape[2]
+        X, size = self.layout.bands.coefficients(self.layout.shift @ rows), self.gram.shape[-1]
         band = self.layout.bands.at(rate).of(len(X))
         for b in np.unique(band[(band >= 0) & (band < (len(self.gram) if bands is None else bands))]):
             flat = X[band == b].reshape(-1, 6 * size)
-            self.gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
+            self.gram[b] += (flat.T @ flat).reshape(6, size, 6, size).swapaxes(1, 2)[PAIRS]
             self.count[b] += len(flat)
 
     def slower(self) -> "Statistics":
@@ -102,7 +102,7 @@ class Statistics:
         bands).
         """
         weight = np.linalg.inv(noise.covariance)
-        half = np.tensordot(weight[:, *_PAIRS] * np.where(_PAIRS[0] == _PAIRS[1], 0.5, 1.0), self._pairs, axes=2)
+        half = np.tensordot(weight[:, *PAIRS] * np.where(_OWN, 0.5, 1.0), self.gram, axes=2)
         return np.asarray(half + half.T)
 
     def information(self, noise: Noise) -> Information:
@@ -117,13 +117,13 @@ class Statistics:
         second = np.outer(z, z)
         second[:-1, :-1] += covariance
         squares = np.empty((len(self.gram), 6, 6))
-        squares[:, *_PAIRS] = squares[:, *_PAIRS[::-1]] = np.tensordot(self._pairs, second, axes=2)
+        squares[:, *PAIRS] = squares[:, *PAIRS[::-1]] = np.tensordot(self.gram, second, axes=2)
         return Moments(squares, self.count.astype(float))
 
-    @cached_property
-    def _pairs(self) -> Array:
-        """(B, 21, p + 1, p + 1) of ``gram``, each pair of channels once: learning asks for all of it in every round."""
-        return np.ascontiguousarray(self.gram.transpose(0, 1, 3, 2, 4)[:, *_PAIRS])
+    @property
+    def own(self) -> Array:
+        """(B, 6, p + 1, p + 1) second moments of each channel with itself."""
+        return self.gram[:, _OWN]
 
 
 def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
@@ -134,7 +134,7 @@ def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
 def empty(parameters: int, layout: Noise) -> Statistics:
     """Return the statistics of no data for ``parameters`` unknowns."""
     bands, size = len(layout.bands), parameters + 1
-    return Statistics(np.zeros((bands, 6, size, 6, size)), np.zeros(bands, dtype=np.intp), layout)
+    return Statistics(np.zeros((bands, len(_OWN), size, size)), np.zeros(bands, dtype=np.intp), layout)
 
 
 def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:

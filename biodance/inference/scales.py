@@ -191,10 +191,13 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
     size[found.without] = 0.0
     loud = np.exp(-2 * at.noise)
-    whole = found.plates * loud + found.markers
+    whole = found.plates * loud
+    whole += found.markers
     seen = found.observed[:, found.used]
     whole[np.ix_(found.used, found.used)] += (seen * at.weights[:, None]).T @ seen
-    A = size[:, None] * whole[:K, :K] * size
+    A = whole[:K, :K]
+    A *= size[:, None]
+    A *= size
     A[np.diag_indices(K)] += 1.0
     lower = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)

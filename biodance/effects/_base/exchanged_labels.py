@@ -3,7 +3,7 @@ cannot tell (left or right, front or back, thumb or not), pelvis, trunk and fing
 contradicts.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -128,9 +128,12 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
     if not wrong:
         return (), ()
     worst = np.argsort(np.max([np.nan_to_num(named[one]) for one in wrong], axis=0))[-_SOME:]
-    some = _misfits(markers, np.union1d(worst, np.linspace(0, markers.time.size - 1, _SOME).astype(int)))
-    gains = {}
+    frames = np.union1d(worst, np.linspace(0, markers.time.size - 1, _SOME).astype(int))
+    some, xyz, gains = _misfits(markers, frames), markers.xyz[frames], {}
+    apart = np.linalg.norm(xyz[:, :, None] - xyz[:, None], axis=3)
     for pairs in _candidates(markers, groups, wrong):
+        if not _may_explain(some, apart, markers.names, groups, pairs):
+            continue
         better, _, gain = _explained(some, groups, pairs)
         if better.sum() >= LEAST_EXCHANGED:
             gains[pairs] = float(gain[better].sum() - 2 * len(pairs) * _NOISE**2 * better.sum())
@@ -198,6 +201,20 @@ def _misfits(markers: Markers, frames: Index) -> _Misfit:
         return known[key]
 
     return misfit
+
+
+def _may_explain(
+    misfit: _Misfit, apart: Array, names: Sequence[str], groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]
+) -> bool:
+    """Return whether groups can fit clearly better with ``pairs`` exchanged, in frames enough, by how far markers are
+    ``apart`` (n, M, M) m alone: most candidates cannot.
+    """
+    other = _other_names(pairs)
+    touched = [one for one in groups if other.keys() & set(one.labels)]
+    named = np.sum([misfit(one, {}) for one in touched], axis=0)
+    with np.errstate(invalid="ignore"):
+        least = np.sum([one.least_misfit(apart, one.columns(names, other)) for one in touched], axis=0)
+        return bool(np.sum(least < _BETTER * named) >= LEAST_EXCHANGED)
 
 
 def _explained(misfit: _Misfit, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]) -> tuple[Mask, Mask, Array]:

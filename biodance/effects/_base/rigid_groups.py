@@ -2,7 +2,7 @@
 the shape of the static trial, frame by frame, under the names it has and under others.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,13 +28,24 @@ class RigidGroup:
     labels: tuple[str, ...]
     shape: Array
 
+    def columns(self, names: Sequence[str], other: Mapping[str, str]) -> list[int]:
+        """Return where its labels (K,) stand among ``names``, with the ``other`` names of some."""
+        return [names.index(other.get(label, label)) for label in self.labels]
+
+    def least_misfit(self, apart: Array, columns: list[int]) -> Array:
+        """Return (n,) m² below which no `misfit` of the markers ``columns`` (K,) lies, by how far all markers are
+        ``apart`` (n, M, M) m: two that are d nearer or farther than in the shape miss it by d at least, together, and
+        (a + b)² <= 2 a² + 2 b².
+        """
+        shape = np.linalg.norm(self.shape[:, None] - self.shape, axis=2)
+        return np.asarray(0.5 * np.max((apart[:, columns][:, :, columns] - shape) ** 2, axis=(1, 2)))
+
     def misfit(self, markers: Markers, other: Mapping[str, str], frames: Index) -> Array:
         """Return (n,) m² the sum of squared distances to the shape in some ``frames``, laid on each as well as a rigid
         body can be (Kabsch 1976, doi:10.1107/S0567739476001873: turned and moved, never mirrored), with the ``other``
         names of some labels; NaN where one is not seen.
         """
-        columns = [markers.names.index(other.get(label, label)) for label in self.labels]
-        points = markers.xyz[frames][:, columns]
+        points = markers.xyz[frames][:, self.columns(markers.names, other)]
         seen = np.isfinite(points).all(axis=(1, 2))
         here = points[seen] - points[seen].mean(axis=1, keepdims=True)
         product = np.einsum("tki,kj->tij", here, self.shape)

@@ -13,6 +13,7 @@ from datetime import date
 from gettext import GNUTranslations
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from babel import Locale, UnknownLocaleError
 from babel.dates import format_date
@@ -21,10 +22,12 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import PoFileError, read_po
 from babel.numbers import format_decimal
 
-from biodance.dance.cues import Say
 from biodance.discovery import DataFamily
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import read_text
+
+if TYPE_CHECKING:
+    from biodance.dance.cues import Say
 
 FAMILY = DataFamily("language", "biodance.languages", "report/languages", ".po")
 ENGLISH = "en"
@@ -172,7 +175,7 @@ SHOWN = (
 _SAID = re.compile(r'\bsay\(\s*"((?:[^"\\]|\\.)*)"')
 
 
-def posture_said(name: str, say: Say) -> str:
+def posture_said(name: str, say: "Say") -> str:
     """Return the ``name`` of a posture, its parts (`posture_phrases`) said one by one."""
     return ", ".join(say(part) for part in name.split(", "))
 

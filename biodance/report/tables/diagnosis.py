@@ -1,10 +1,10 @@
 """What a diagnosis found, and what a movement will be able to see. Channels in the order Fx Fy Fz Mx My Mz."""
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from biodance.dance.expectation import Expectation
 from biodance.diagnosis.diagnosis import Estimate
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
@@ -14,14 +14,23 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.report.tables.schema import Row, Schema
-from biodance.virtual_lab.causes import CAUSES
+
+if TYPE_CHECKING:
+    from biodance.dance.expectation import Expectation
+
+
+def _can_be_simulated(one: Cause) -> bool:
+    from biodance.virtual_lab.causes import CAUSES
+
+    return one.name in CAUSES
+
 
 _PARAMETER = Schema("name unit typical")
 CAUSE_ROW = Schema(
     "effect=name what=about.what",
     {
         "parameters": lambda one: [] if isinstance(one, DiscreteEffect) else _PARAMETER.rows(one.parameters),
-        "can_be_simulated": lambda one: one.name in CAUSES,
+        "can_be_simulated": _can_be_simulated,
     },
     "effect: {effect} | parameters: {told} | simulate: {simulated} | what it is: {what}",
 )
@@ -207,7 +216,7 @@ def seen_causes(found: Row) -> list[tuple[str, str]]:
     return [(row["effect"], row["target"]) for row in rows]
 
 
-def _learned(known: Expectation | None) -> str:
+def _learned(known: "Expectation | None") -> str:
     """Return in a sentence which masses a dance teaches, with their expected 95 % half-widths, kg."""
     if known is None:
         return ""
@@ -220,7 +229,7 @@ def _learned(known: Expectation | None) -> str:
 
 
 def foresight_document(
-    found: Foresight, *, seated: bool = False, plates: str = "", known: Expectation | None = None
+    found: Foresight, *, seated: bool = False, plates: str = "", known: "Expectation | None" = None
 ) -> Row:
     """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two
     causes it sees; ``care`` what must not be asked of whoever dances ``seated``; ``plates`` a sentence on how much
