@@ -16,7 +16,7 @@ from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import Provenance, now
-from biodance.records import CHANNEL_TITLES, CHANNELS
+from biodance.records import CHANNEL_TITLES, CHANNELS, grouped
 from biodance.report.figures.vector import (
     LEFT_SIDE,
     RIGHT_SIDE,
@@ -112,9 +112,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     """Return per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of
     its places.
     """
-    kinds: dict[str, list[float]] = {}
-    for row in rows:
-        kinds.setdefault(row.effect, []).append(row.limit / row.typical)
+    kinds = grouped((row.effect, row.limit / row.typical) for row in rows)
     order = sorted(kinds, key=lambda name: -np.median(kinds[name]))
     words = ((0.01, "1 %"), (0.1, "a tenth"), (1.0, "typical size"), (10.0, "ten times"))
     x = Axis(0.008, 30.0, "smallest size that this session would have seen, in typical sizes", words, log=True)
@@ -261,12 +259,8 @@ def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:
     if evidence is None:
         return None
     rows = VISIBILITY_ROW.rows(cause_visibilities(evidence))
-    unseen: dict[str, list[str]] = {}
-    for row in rows:
-        if not row["witnesses"]:
-            unseen.setdefault(" ".join(row["would_be_seen_by"]), []).append(
-                cause_in_words(row["effect"], row["target"])
-            )
+    blind = (row for row in rows if not row["witnesses"])
+    unseen = grouped((" ".join(row["would_be_seen_by"]), cause_in_words(row["effect"], row["target"])) for row in blind)
     return {
         "seen": [row for row in rows if row["witnesses"]],
         "unseen": [("; ".join(causes), would) for would, causes in unseen.items()],
