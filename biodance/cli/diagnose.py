@@ -20,7 +20,7 @@ from biodance.cli.app import (
     progress,
     show,
 )
-from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results, tabled
+from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results
 
 if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult
@@ -97,6 +97,7 @@ def diagnose_command(
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
+    from biodance.report.tables.frames import write_session_tables
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
@@ -109,7 +110,7 @@ def diagnose_command(
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
-        tabled(result, tables, found.diagnosis, movement=moved)
+        write_session_tables(tables, result, found.diagnosis, movement=moved)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
         folder = put_session_results(place, recorded)
     results.show_page(folder)
@@ -178,6 +179,7 @@ def identify_command(
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import by_paper, identification_of
+    from biodance.report.tables.frames import write_session_tables
     from biodance.report.write import write_identification
 
     with progress() as tell:
@@ -195,7 +197,7 @@ def identify_command(
         checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tell("writing the page")
-        tabled(result, tables, movement=moved)
+        write_session_tables(tables, result, movement=moved)
         document = write_identification(result, found, place.part, checks=checks, movement=moved)
         folder = put_session_results(place, result.session)
     results.show_page(folder)

@@ -27,10 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from biodance.dance.dance import Dance
-    from biodance.diagnosis.diagnosis import Diagnosis
     from biodance.lab.session.results_folder import ResultsFolder
     from biodance.pipeline.identification import SessionIdentification
-    from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
     from biodance.settings import Value
@@ -46,15 +44,11 @@ def report_session(
     lab: Path | None = None,
     for_subject: str | None = None,
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
-    person who was measured in that language; return the result and the content of results.json.
-    """
+    """Diagnose an examined session and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.load import as_diagnosed
-    from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
-    from biodance.report.write import write_report, write_subject_page
+    from biodance.report.write import write_session
 
     found = None
     try:
@@ -63,30 +57,7 @@ def report_session(
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
-    result = as_diagnosed(result, found.diagnosis) if found else result
-    moved = describe_movement(result, lab=lab, tell=tell)
-    tell("writing the page")
-    tabled(result, tables, found.diagnosis if found else None, movement=moved)
-    if for_subject:
-        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
-    return result, write_report(result, folder, diagnosis=found, movement=moved)
-
-
-def tabled(
-    result: "SessionResult",
-    folder: Path | None,
-    diagnosis: "Diagnosis | None" = None,
-    *,
-    movement: "SessionMovement | None" = None,
-) -> None:
-    """Write the tables of a result in the place of those that its folder holds; nothing without one."""
-    from biodance.lab.session.results_folder import whole_folder
-    from biodance.report.files import write_tables
-    from biodance.report.tables.frames import session_tables
-
-    if folder is not None:
-        with whole_folder(folder, over=True) as part:
-            write_tables(session_tables(result, diagnosis, movement), part)
+    return write_session(result, found, folder, tables=tables, lab=lab, for_subject=for_subject, tell=tell)
 
 
 def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:

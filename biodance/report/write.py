@@ -1,6 +1,6 @@
 """Write what was found into a folder: the page for the analyst and the numbers for programs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
-from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.load import as_diagnosed
+from biodance.pipeline.movement import SessionMovement, describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
 from biodance.pipeline.session_frames import frames_of
@@ -30,6 +31,7 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
+from biodance.report.tables.frames import write_session_tables
 from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
 from biodance.report.tables.session import (
@@ -41,6 +43,30 @@ from biodance.report.tables.session import (
 )
 
 PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
+
+
+def write_session(
+    result: SessionResult,
+    found: SessionDiagnosis | None,
+    folder: Path,
+    *,
+    tables: Path | None = None,
+    lab: Path | None = None,
+    for_subject: str | None = None,
+    drawn: bool = True,
+    tell: Callable[[str], None],
+) -> tuple[SessionResult, dict[str, Any]]:
+    """Write what was found in a session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for
+    the person who was measured in that language; return the result and the content of results.json.
+    """
+    diagnosis = found.diagnosis if found else None
+    result = as_diagnosed(result, diagnosis) if diagnosis else result
+    moved = describe_movement(result, lab=lab, tell=tell)
+    tell("writing the page" if drawn else "writing")
+    write_session_tables(tables, result, diagnosis, movement=moved)
+    if for_subject:
+        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
+    return result, write_report(result, folder, diagnosis=found, movement=moved, drawn=drawn)
 
 
 def write_report(
