@@ -16,8 +16,8 @@ from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.saved_results import now, provenance
 from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
+from biodance.report.figures import vector as svg
 from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
-from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.files import for_spreadsheets, write_files
 from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
@@ -144,24 +144,24 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     standard deviation between its cycles, and how many they are; "" where no quantity is known in two visits.
     """
     # the last visit is drawn full in the side's colour, the others grey and dashed
-    looks = [Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
-    looks, cells = [*looks, Stroke(_COLOURS[side], "", 1.6)], []
+    looks = [svg.Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
+    looks, cells = [*looks, svg.Stroke(_COLOURS[side], "", 1.6)], []
     by_visit = [{(one.kind, one.quantity, one.side): one for one in groups} for groups in found.curves()]
     for quantity in quantities:
         some = [groups.get((kind, quantity, side)) for groups in by_visit]
         known = [one for one in some if one is not None and np.isfinite(one.mean).any()]
         if len(known) > 1:
             curves = [
-                Curve(visit.name, one.mean, look, one.sd if np.isfinite(one.sd).any() else None)
+                svg.Curve(visit.name, one.mean, look, one.sd if np.isfinite(one.sd).any() else None)
                 for visit, one, look in zip(found.visits, some, looks, strict=True)
                 if one is not None and np.isfinite(one.mean).any()
             ]
             title = f"{curve_title(known[0])}, n = {_counts(some)}"
-            cells.append([Strip(title, curves, least=LEAST_SPANS.get(known[0].unit, 0.0))])
+            cells.append([svg.Strip(title, curves, least=LEAST_SPANS.get(known[0].unit, 0.0))])
     if not cells:
         return ""
     about = f"{CYCLE_KINDS[kind]}, {side} side, all visits on one plot"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
+    return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
 
 
 def _counts(some: Sequence[CurveGroup | None]) -> str:

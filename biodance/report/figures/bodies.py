@@ -7,7 +7,7 @@ import numpy as np
 from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, Interval, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import known_interval
-from biodance.report.figures.vector import Axis, Frame, Stroke, panel, points, segments, with_legend
+from biodance.report.figures import vector as svg
 
 ROW = 19.0
 """px of a segment's row."""
@@ -54,9 +54,9 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
     """Return one panel: a row for each segment."""
     ends = np.array([v for row in rows for v in (*row.before, *row.after, beside.get(row.name, row.after[0]))])
     room, least = 0.04 * float(np.ptp(ends)), -np.inf if ends.min() < 0 else 0.0
-    x = Axis(max(least, float(ends.min()) - room), float(ends.max()) + room, label)
+    x = svg.Axis(max(least, float(ends.min()) - room), float(ends.max()) + room, label)
     ticks = tuple((len(rows) - 1.0 - i, spaced(row.name)) for i, row in enumerate(rows))
-    y = Axis(-0.6, len(rows) - 0.4, "", ticks)
+    y = svg.Axis(-0.6, len(rows) - 0.4, "", ticks)
     marks = []
     for (at, _), row in zip(ticks, rows, strict=True):
         edge = BLACK if row.known == "cannot be known" else GREEN
@@ -64,17 +64,17 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
             (at + 0.17, row.before, GREY, "#fff", 1.0),
             (at - 0.17, row.after, edge, _INSIDE[row.known], 1.8),
         ):
-            marks.append(segments(x, y, np.array([[low, up], [high, up]]), Stroke(colour, "", wide)))
-            marks.append(points(x, y, value, up, Stroke(colour), inside=inside, size=6.5))
+            marks.append(svg.segments(x, y, np.array([[low, up], [high, up]]), svg.Stroke(colour, "", wide)))
+            marks.append(svg.points(x, y, value, up, svg.Stroke(colour), inside=inside, size=6.5))
         if load is not None and row.name == load[0]:
             ends = np.array([[row.after[0] - load[1], at - 0.4], [row.after[0], at - 0.4]])
-            marks.append(segments(x, y, ends, Stroke(PINK, "", 2.4)))
+            marks.append(svg.segments(x, y, ends, svg.Stroke(PINK, "", 2.4)))
         if row.name in beside:
-            marks.append(points(x, y, beside[row.name], at, Stroke(BLUE)))
-    frame = Frame(height=ROW * len(rows), left=112.0, above=4.0)
-    return panel(x, y, marks, f"{label.partition(',')[0]} of every segment, table and identified", frame=frame)
+            marks.append(svg.points(x, y, beside[row.name], at, svg.Stroke(BLUE)))
+    frame = svg.Frame(height=ROW * len(rows), left=112.0, above=4.0)
+    return svg.panel(x, y, marks, f"{label.partition(',')[0]} of every segment, table and identified", frame=frame)
 
 
 def _with_legend(drawn: Sequence[str], paper: Identification | None, load: _Load) -> str:
     more = {"blue point: the paper's programme": paper is not None, "pink: load": load is not None}
-    return with_legend((*_WORDS, *(word for word, there in more.items() if there)), drawn)
+    return svg.with_legend((*_WORDS, *(word for word, there in more.items() if there)), drawn)

@@ -15,26 +15,9 @@ from biodance.identification.validation import TrialValidation
 from biodance.motion.dynamics import Agreement
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNEL_TITLES, AngleState
+from biodance.report.figures import vector as svg
 from biodance.report.figures.bodies import ROW, mass_figure, shape_figure
 from biodance.report.figures.session import bar_list
-from biodance.report.figures.vector import (
-    LEFT_SIDE,
-    MIDDLE_SIDE,
-    RIGHT_SIDE,
-    Axis,
-    Curve,
-    CurveFigure,
-    Frame,
-    Strip,
-    Stroke,
-    around,
-    panel,
-    points,
-    rule,
-    segments,
-    shade,
-    with_legend,
-)
 from biodance.report.pages.template import render
 from biodance.report.tables.identification import (
     DIFFERENCE_ROW,
@@ -65,18 +48,18 @@ def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference
     """
     names = list(dict.fromkeys(row.segment for row in changes))
     ticks = tuple((len(names) - 1.0 - i, spaced(name)) for i, name in enumerate(names))
-    y, drawn = Axis(-0.6, len(names) - 0.4, "", ticks), []
+    y, drawn = svg.Axis(-0.6, len(names) - 0.4, "", ticks), []
     for quantity, factor, title in _PANELS:
         rows = [row for row in changes if row.quantity == quantity]
         ends = factor * np.array([[*row.interval, row.value] for row in rows])
-        x = around(np.append(ends, 0.0), label=title)
-        marks = [rule(x, 0.0, upright=True, look=Stroke(BLACK, "", 0.8))]
+        x = svg.around(np.append(ends, 0.0), label=title)
+        marks = [svg.rule(x, 0.0, upright=True, look=svg.Stroke(BLACK, "", 0.8))]
         for (at, _), row in zip(ticks, rows, strict=True):
-            look = Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
-            marks.append(segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
+            look = svg.Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
+            marks.append(svg.segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
             inside = "" if row.known else "#fff"
-            marks.append(points(x, y, factor * row.value, at, look, inside=inside))
-        drawn.append(panel(x, y, marks, title, frame=Frame(height=17.0 * len(names), left=112.0, above=4.0)))
+            marks.append(svg.points(x, y, factor * row.value, at, look, inside=inside))
+        drawn.append(svg.panel(x, y, marks, title, frame=svg.Frame(height=17.0 * len(names), left=112.0, above=4.0)))
     return f'<div class="cells">{"".join(drawn)}</div>'
 
 
@@ -98,30 +81,36 @@ def impact_figure(found: Sequence[Impact]) -> str:
     """
     rows = list(found[:_RANKED])
     ticks = tuple((len(rows) - 1.0 - i, spaced(f"{row.segment} {row.quantity}")) for i, row in enumerate(rows))
-    y = Axis(-0.6, len(rows) - 0.4, "", ticks)
+    y = svg.Axis(-0.6, len(rows) - 0.4, "", ticks)
     far = max(2.0, *(abs(row.pull) + row.left for row in rows))
-    pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
+    pulled = svg.Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
     largest = max(max(row.knee, row.hip) for row in rows)
-    moment = Axis(0.0, 1.08 * largest, "moment that one sd left adds (N·m RMS)")
-    left = [shade(pulled, -1.0, 1.0, kind="certain"), rule(pulled, 0.0, upright=True)]
+    moment = svg.Axis(0.0, 1.08 * largest, "moment that one sd left adds (N·m RMS)")
+    left = [svg.shade(pulled, -1.0, 1.0, kind="certain"), svg.rule(pulled, 0.0, upright=True)]
     right = []
     for (at, _), row in zip(ticks, rows, strict=True):
         ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
-        left += [segments(pulled, y, ends, Stroke(BLACK)), points(pulled, y, row.pull, at, Stroke(BLACK))]
+        left += [
+            svg.segments(pulled, y, ends, svg.Stroke(BLACK)),
+            svg.points(pulled, y, row.pull, at, svg.Stroke(BLACK)),
+        ]
         knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
-        right += [segments(moment, y, knee, Stroke(GREEN, "", 2.0)), segments(moment, y, hip, Stroke(PINK, "4 2", 2.0))]
-        right += [points(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
-        right += [points(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
-    frame = Frame(height=ROW * len(rows), left=138.0, above=4.0)
-    pulls = panel(pulled, y, left, "pull of every quantity", frame=frame)
-    impacts = panel(moment, y, right, "impact on knee and hip", frame=frame)
+        right += [
+            svg.segments(moment, y, knee, svg.Stroke(GREEN, "", 2.0)),
+            svg.segments(moment, y, hip, svg.Stroke(PINK, "4 2", 2.0)),
+        ]
+        right += [svg.points(moment, y, row.knee, at + 0.16, svg.Stroke(GREEN))]
+        right += [svg.points(moment, y, row.hip, at - 0.16, svg.Stroke(PINK), inside="#fff")]
+    frame = svg.Frame(height=ROW * len(rows), left=138.0, above=4.0)
+    pulls = svg.panel(pulled, y, left, "pull of every quantity", frame=frame)
+    impacts = svg.panel(moment, y, right, "impact on knee and hip", frame=frame)
     words = ("grey: one prior standard deviation", "green point: knee flexion", "pink ring: hip flexion")
-    return with_legend(words, (pulls, impacts))
+    return svg.with_legend(words, (pulls, impacts))
 
 
 _SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
 """Joints drawn, right and left in one panel."""
-_SIDES = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "": MIDDLE_SIDE}
+_SIDES = {"right": svg.RIGHT_SIDE, "left": svg.LEFT_SIDE, "": svg.MIDDLE_SIDE}
 
 
 def drawn_joints(bands: TorqueBands) -> list[tuple[str, list[tuple[int, str]]]]:
@@ -149,12 +138,12 @@ def torque_figure(bands: TorqueBands) -> str:
                 for column in (bands.torque, bands.half_width, bands.table)
             )
             look = _SIDES[side]
-            curves.append(Curve(f"{side or 'trunk'} identified", torque, look, half))
-            curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
-        cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
+            curves.append(svg.Curve(f"{side or 'trunk'} identified", torque, look, half))
+            curves.append(svg.Curve(f"{side or 'trunk'} with the table", table, svg.Stroke(look.colour, "1 3", 0.9)))
+        cells.append([svg.Strip(f"{title} (N·m)", curves, 4.0)])
     about = "Moments of the large joints; the largest values are in the table below"
     filled = bands.state == AngleState.FILLED
-    return CurveFigure(bands.time, cells, about, bands.use, bands.trial, filled=filled).html()
+    return svg.CurveFigure(bands.time, cells, about, bands.use, bands.trial, filled=filled).html()
 
 
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
