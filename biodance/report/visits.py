@@ -18,10 +18,10 @@ from biodance.pipeline.saved_results import now, provenance
 from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
 from biodance.report.figures import vector as svg
 from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
-from biodance.report.files import for_spreadsheets, write_files
+from biodance.report.files import csv_text, write_results
 from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.schema import Row, Schema, plain_values, table_of, to_text
+from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.report.terminal import print_line, print_table
 from biodance.report.wording import changed, millimetres, moment, sized_together
@@ -206,7 +206,6 @@ def visits_page(found: VisitComparison, document: Row) -> str:
         scripts=[template_text("curves.js")],
         sheet=Markup(sheet),
         title=title,
-        version=__version__,
         document=document,
         schema=QUANTITY_ROW,
         placed=placement_words(),
@@ -223,12 +222,10 @@ def write_visits(found: VisitComparison, folder: Path) -> Row:
     """
     document = visits_document(found)
     texts = {
-        "results.json": to_text(document),
         COMPARE_PAGE: visits_page(found, document),
-        "quantities.csv": for_spreadsheets(quantities_frame(found)).to_csv(index=False, lineterminator="\n"),
+        "quantities.csv": csv_text(quantities_frame(found)),
     }
-    write_files(folder, texts)
-    return dict(plain_values(document))
+    return write_results(folder, document, texts)
 
 
 def print_compared(found: VisitComparison, document: Row, console: Console) -> None:

@@ -23,7 +23,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
 from biodance.pipeline.session_frames import frames_of
 from biodance.records.attention import Attention
-from biodance.report.files import write_files
+from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.language import ENGLISH
@@ -33,7 +33,7 @@ from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
 from biodance.report.tables.frames import write_session_tables
 from biodance.report.tables.identification import corrected_document, identification_document
-from biodance.report.tables.schema import plain_values, to_text
+from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import (
     PROVENANCE_ROW,
     filter_document,
@@ -42,7 +42,7 @@ from biodance.report.tables.session import (
     results_document,
 )
 
-PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
+PAGE, SUBJECT_PAGE = "report.html", "subject.html"
 
 
 def write_session(
@@ -92,11 +92,10 @@ def write_report(
         "gait": gait_document(movement),
     }
     found: dict[str, Any] = plain_values(numbers)
-    files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
+    files = {METHODS: methods_text(found)}
     if drawn:
         files |= {PAGE: _page(result, made, first, diagnosis, movement)} | _kept(result, folder)
-    write_files(folder, files)
-    return found
+    return write_results(folder, found, files)
 
 
 def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
@@ -151,9 +150,7 @@ def write_identification(
     }
     told: dict[str, Any] = plain_values(numbers)
     page = _page(result, made, first, movement=movement)
-    files = {_NUMBERS: to_text(told), METHODS: methods_text(told), PAGE: page}
-    write_files(folder, files | _kept(result, folder))
-    return told
+    return write_results(folder, told, {METHODS: methods_text(told), PAGE: page} | _kept(result, folder))
 
 
 def write_diagnosis(
@@ -185,8 +182,7 @@ def write_diagnosis(
     if accepted:
         numbers["accepted"], more = _accepted(result, found, folder, earlier)
         files |= more
-    write_files(folder, {_NUMBERS: to_text(numbers), **files})
-    return dict(plain_values(numbers))
+    return write_results(folder, numbers, files)
 
 
 def _accepted(

@@ -30,7 +30,6 @@ from biodance.report.tables.diagnosis import (
     seen_causes,
 )
 from biodance.report.tables.schema import Row, Schema
-from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -261,7 +260,6 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         "foresight.html.j2",
         found=document,
         movement=name,
-        version=__version__,
         created=now(),
         schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
         first=FIRST,
