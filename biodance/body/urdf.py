@@ -98,7 +98,10 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
     written = [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, written, strict=True)])
-    lumps = [_possible(lump, box) for lump, box in zip(written, boxes, strict=True)] if mend else written
+    lumps = [
+        solid(lump, box) if mend and lump.mass > 0 and not is_possible(lump) else lump
+        for lump, box in zip(written, boxes, strict=True)
+    ]
     com = np.array([lump.com for lump in lumps])[:, None]
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
     body = Body(
@@ -123,11 +126,6 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         raise FileRefused(f"{file.path}: {error} Or ask to mend it (--mend): a solid box in its place.") from error
     spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
     return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
-
-
-def _possible(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return the inertia, or that of a solid box in its place where no body of its mass can have it."""
-    return solid(lump, box) if lump.mass > 0 and not is_possible(lump) else lump
 
 
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
@@ -156,16 +155,13 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
                 for visit, one, look in zip(found.visits, some, looks, strict=True)
                 if one is not None and np.isfinite(one.mean).any()
             ]
-            title = f"{curve_title(known[0])}, n = {_counts(some)}"
+            counts = ", ".join("0" if one is None else str(len(one.values)) for one in some)
+            title = f"{curve_title(known[0])}, n = {counts}"
             cells.append([svg.Strip(title, curves, least=LEAST_SPANS.get(known[0].unit, 0.0))])
     if not cells:
         return ""
     about = f"{CYCLE_KINDS[kind]}, {side} side, all visits on one plot"
     return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
-
-
-def _counts(some: Sequence[CurveGroup | None]) -> str:
-    return ", ".join("0" if one is None else str(len(one.values)) for one in some)
 
 
 def _figures(found: VisitComparison) -> list[tuple[str, str, str]]:
