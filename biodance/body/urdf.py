@@ -90,10 +90,7 @@ def _body(
     written = [parts.combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, written, strict=True)])
-    lumps = [
-        solid(lump, box) if mend and lump.mass > 0 and not is_possible(lump) else lump
-        for lump, box in zip(written, boxes, strict=True)
-    ]
+    lumps = [_possible(lump, box) for lump, box in zip(written, boxes, strict=True)] if mend else written
     com = np.array([lump.com for lump in lumps])[:, None]
     phi = np.concatenate([parts.inertial_parameters(lump) for lump in lumps])
     body = Body(
@@ -118,6 +115,11 @@ def _body(
         raise FileRefused(f"{file.path}: {error} Or ask to mend it (--mend): a solid box in its place.") from error
     spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
     return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
+
+
+def _possible(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
+    """Return the inertia, or that of a solid box in its place where no body of its mass can have it."""
+    return solid(lump, box) if lump.mass > 0 and not is_possible(lump) else lump
 
 
 def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_Carrier], dict[str, _Carrier]]:

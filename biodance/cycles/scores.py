@@ -210,7 +210,7 @@ def gait_scores(
     mean; a side's profile score the root mean square of its nine; that of both sides of 15: the pelvis counts once,
     with the left cycles (Baker et al. 2009, doi:10.1016/j.gaitpost.2009.05.020). The index: see `deviation_reference`.
     """
-    bands = {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
+    bands = _gait_bands(normal)
     vectors = gait_vectors(curves)
     if not set(SCORE_ANGLES) <= set(bands) or not vectors:
         return None
@@ -228,6 +228,11 @@ def gait_scores(
     gdi = _known_spreads({side: [value for cycle, value in index.items() if cycle.side == side] for side in seen})
     people = min(bands[name].people for name in SCORE_ANGLES)
     return GaitScores(variables, gps, _overall(seen), gdi, people)
+
+
+def _gait_bands(normal: Sequence[NormalCurve]) -> dict[str, NormalCurve]:
+    """Return the reference's angles in gait by their names."""
+    return {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
 
 
 def _known_spreads(values: Mapping[_Key, Iterable[float]]) -> dict[_Key, Spread]:
