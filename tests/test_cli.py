@@ -13,7 +13,7 @@ import pytest
 from bad_sessions import UNREADABLE, bad_session
 
 from biodance.cli import run
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
+from biodance.cli.shared import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
 from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session

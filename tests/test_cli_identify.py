@@ -12,7 +12,7 @@ from identified_sessions import body, session_result
 
 from biodance.body.export.csv import STANDARD
 from biodance.cli import run
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
+from biodance.cli.shared import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.effects import QualityCheck
 from biodance.lab.program_tables import read_mot
 from biodance.lab.session.results_folder import check_results

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from biodance.cli.app import Results, TimeLeft, _plain, progress, seconds_in_words
+from biodance.cli.shared import Results, TimeLeft, _plain, progress, seconds_in_words
 
 
 class Clock:

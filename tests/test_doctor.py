@@ -6,7 +6,7 @@ import pytest
 
 from biodance import doctor
 from biodance.cli import run
-from biodance.cli.app import DONE, NEEDS_A_PERSON
+from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.doctor import MachineFinding, Probe, run_probe
 
 MEND = "apt-get install it."

@@ -7,6 +7,7 @@ from c3d_files import File, real, text, whole
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import model_outputs
 from biodance.lab.inspect import inspect_file
+from biodance.lab.markers.upright import extents, likely_unit
 from biodance.lab.readers.c3d import read_c3d
 
 
@@ -90,6 +91,15 @@ def test_missing_odd_or_impossible_units_are_decided_by_the_size_of_the_person_a
     trial = read(file(unit=unit, per_metre=per_metre))
     np.testing.assert_allclose(trial.markers.xyz, person(), atol=1e-6)
     assert "can only be in" in trial.warnings[0]
+
+
+def test_a_cloud_is_measured_where_it_is_seen_and_tells_its_unit():
+    cloud = np.array([[[0.0, 0, 0], [3, 4, 5], [9, np.nan, 9]], [[0, 0, 0], [np.nan] * 3, [np.nan] * 3]])
+    assert extents(cloud, 2).tolist() == [[9.0, 4.0, 9.0]]
+    assert extents(cloud, 1).tolist() == [[9.0, 4.0, 9.0], [0.0, 0.0, 0.0]]
+    assert extents(cloud, 3).shape == (0, 3)
+    assert [likely_unit(size) for size in (1800.0, 180.0, 0.9)] == ["mm", "cm", "m"]
+    assert likely_unit(0.6, 0.6) == "m"
 
 
 def test_a_unit_that_nothing_tells_is_refused(read):

@@ -14,7 +14,7 @@ from stream_faults import exchanged, offset, silent
 
 from biodance.body.human.human import human
 from biodance.cli import run
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
+from biodance.cli.shared import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body

@@ -19,7 +19,7 @@ from benchmarks.plates import Step, draw
 from biodance.batch.summary import write_summary
 from biodance.batch.work import Outcome, trial_rows
 from biodance.cli import run
-from biodance.cli.app import NOT_DONE
+from biodance.cli.shared import NOT_DONE
 from biodance.dance.problem.plan import read_plan
 from biodance.diagnosis.archive.judge import judge_archive
 from biodance.lab.session.read import read_session

@@ -8,7 +8,7 @@ from identified_sessions import body, session_result
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.cli import run
-from biodance.cli.app import NEEDS_A_PERSON, NOT_DONE
+from biodance.cli.shared import NEEDS_A_PERSON, NOT_DONE
 from biodance.errors import NotSolved
 from biodance.identification.added_mass import added_mass
 from biodance.identification.identification import identify_body

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.cli import run
-from biodance.cli.app import DONE, NOT_DONE
+from biodance.cli.shared import DONE, NOT_DONE
 from biodance.errors import TrialRefused
 from biodance.identification.torques import ground_torques, torque_regressor
 from biodance.lab.c3d.raw import read_raw

@@ -12,8 +12,8 @@ import pytest
 from example_results import FOUND, LEFT, UNLIKE, VERDICTS, WHOLE, full_session
 from rich.console import Console
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
+from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention

@@ -8,7 +8,7 @@ import pytest
 
 import biodance
 from biodance.cli import run
-from biodance.cli.app import DONE, NOT_DONE
+from biodance.cli.shared import DONE, NOT_DONE
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.lab.markers.upright import is_still, movement, standing_mass
 from biodance.lab.prepare import LowPass, force_filter, low_pass, motion_filter, prepare

@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 from biodance.body.body import body_text, read_body
-from biodance.cli.app import say
+from biodance.cli.shared import say
 from biodance.dance.dance import Dance
 from biodance.errors import FileRefused, without_codes
 from biodance.lab.corrections import read_corrections

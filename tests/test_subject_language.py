@@ -16,7 +16,7 @@ from identified_sessions import session_result
 from made_cycles import walked_knees
 
 from biodance.cli import run
-from biodance.cli.app import NOT_DONE
+from biodance.cli.shared import NOT_DONE
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.search.known_postures import posture_phrases
 from biodance.errors import FileRefused, UnknownName

@@ -13,7 +13,7 @@ from identified_sessions import session_result
 from made_cycles import walked_knees
 
 from biodance.cli import run
-from biodance.cli.app import DONE, NEEDS_A_PERSON
+from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.trial_result import Check
 from biodance.report.pages.language import read_language

@@ -198,10 +198,5 @@ def _take_out(document: Container, keys: list[str]) -> None:
         inner = table.get(key)
         if key == keys[-1] and table is tables[-1]:
             table.pop(key, None)
-        elif isinstance(inner, AbstractTable) and not inner and not _says_more(inner):
-            table.pop(key)
-
-
-def _says_more(table: AbstractTable) -> bool:
-    """Return whether an empty table holds comments."""
-    return bool(tomlkit.dumps(table.value).strip())
+        elif isinstance(inner, AbstractTable) and not inner and not tomlkit.dumps(inner.value).strip():
+            table.pop(key)  # Empty, and no comment stands in it

@@ -3,7 +3,6 @@ Nothing of a session is touched.
 """
 
 import json
-import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -90,15 +89,11 @@ def _exchanged_labels(result: SessionResult, finding: _Finding) -> Iterator[KeyC
             continue
         count += 1
         time, stem = trial.markers.time, trial.source.path.stem
-        earlier = [
-            [one.one, one.other, *((one.start, one.end) if math.isfinite(one.start) else ())]
-            for one in said.parts(stem).exchanges
-        ]
         ends: list[Sequence[float]] = [
             () if stop - start == time.size else time[[start, stop - 1]].round(4).tolist() for start, stop in spans
         ]
         new = [[*pair, *span] for span in ends]
-        yield ["trials", stem, "exchange"], [*earlier, *new]
+        yield ["trials", stem, "exchange"], [*(one.entry for one in said.parts(stem).exchanges), *new]
     if not count:
         raise BiodanceError(f"{' and '.join(pair)} carry each other's names no more. Run the session again.")
 

@@ -20,9 +20,10 @@ from biodance.lab.session.entries import plate_channels
 from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
-from biodance.records import ROLES, Array, FootEvent, Markers, Plate, Session, Trial, runs
+from biodance.records import ROLES, Array, Markers, Plate, Session, Trial, runs
 from biodance.report.pages.template import packed_numbers
 from biodance.report.tables.schema import plain_values
+from biodance.report.tables.session import EVENT_ROW
 
 _FRAMES = 1500  # Frames of a trial that are drawn at most
 _POINTS = 600  # Points of a curve that are drawn at most
@@ -180,8 +181,8 @@ class SessionView:
                 "role": role or (trial.role if trial else ""),
                 "told": role is not None,
                 "why": session.refused.get(path.name, ""),
-                "exchange": [_exchange(one.one, one.other, one.start, one.end) for one in parts.exchanges],
-                "events": [_event(one) for one in parts.events],
+                "exchange": [one.entry for one in parts.exchanges],
+                "events": EVENT_ROW.rows(parts.events),
                 "leave_out": [[one.start, one.end, *([one.side] if one.side else [])] for one in parts.left_out],
             }
             yield row | (_of_trial(trial) if trial else {"name": ""})
@@ -245,14 +246,6 @@ def _places(worn: MarkerSet) -> dict[str, str]:
         if len(alternatives[0]) == 1:
             places[alternatives[0][0]] = landmark
     return places | {alias: places[label] for alias, label in worn.aliases.items() if label in places}
-
-
-def _exchange(one: str, other: str, start: float, end: float) -> list[Any]:
-    return [one, other, start, end] if math.isfinite(start) else [one, other]
-
-
-def _event(one: FootEvent) -> dict[str, Any]:
-    return {"time_s": one.time, "side": one.side, "down": one.down, "source": one.source}
 
 
 def _of_trial(trial: Trial) -> dict[str, Any]:

@@ -9,19 +9,8 @@ from typing import Any
 
 from starlette.responses import Response
 
+from biodance.app import outputs
 from biodance.app.limits import limits_form, limits_text
-from biodance.app.outputs import (
-    csv_archive,
-    exported,
-    keep_acceptance,
-    page_part,
-    preview_of_acceptance,
-    read_results,
-    results_file,
-    run_task,
-    shown_results,
-    workbook,
-)
 from biodance.app.sessions import Archive, SessionPlace, Worker, allowed_folder, folders_document, results_beside
 from biodance.app.view import SessionView, forces_document, markers_document
 from biodance.errors import BiodanceError
@@ -120,15 +109,15 @@ class Window:
 
     def results(self, asked: Asked) -> dict[str, Any]:
         """Return what the last run found."""
-        return shown_results(self._place(asked))
+        return outputs.shown_results(self._place(asked))
 
     def strides(self, asked: Asked) -> dict[str, Any]:
         """Return the spatio-temporal values of a trial in the last run, and with session.toml as it is now."""
         place, trial = self._place(asked), self._trial(asked)
-        read_results(place)
+        outputs.read_results(place)
         about = (str(place.results), str(place.folder), trial.name, trial.source.path.stem)
         with self._one_export:
-            return {"rows": run_task("strides", *about)}
+            return {"rows": outputs.run_task("strides", *about)}
 
     def run(self, asked: Asked) -> dict[str, Any]:
         """Begin a run over sessions."""
@@ -145,7 +134,7 @@ class Window:
 
     def page(self, asked: Asked) -> Response:
         """Return a part of report.html, or all of it."""
-        text = page_part(self._place(asked), asked.text("part"))
+        text = outputs.page_part(self._place(asked), asked.text("part"))
         return Response(text, media_type="text/html", headers={"Content-Security-Policy": _SANDBOX})
 
     def download(self, asked: Asked) -> Response:
@@ -155,26 +144,26 @@ class Window:
         place, kind = self._place(asked), asked.text("format")
         stem = place.folder.resolve().name
         if kind == "file":
-            path = results_file(place, asked.text("file"))
+            path = outputs.results_file(place, asked.text("file"))
             return _attached(path.name, path.read_bytes())
         with self._one_export:
             if kind == "xlsx":
-                return _attached(f"{stem}.xlsx", workbook(place))
+                return _attached(f"{stem}.xlsx", outputs.workbook(place))
             if kind == "csv":
-                return _attached(f"{stem}_tables.zip", csv_archive(place))
-            return _attached(*exported(place, kind, asked.text("trial")))
+                return _attached(f"{stem}_tables.zip", outputs.csv_archive(place))
+            return _attached(*outputs.exported(place, kind, asked.text("trial")))
 
     def correction(self, asked: Asked) -> dict[str, Any]:
         """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
         place, wanted = self._place(asked), asked.body.get("findings")
-        found = (read_results(place)["diagnosis"] or {}).get("findings", [])
+        found = (outputs.read_results(place)["diagnosis"] or {}).get("findings", [])
         able = {f"{one['effect']} {one['target']}": one for one in found if one.get("session_entry")}
         if not isinstance(wanted, list) or not wanted or not set(wanted) <= able.keys():
             raise BiodanceError(f"findings must be some that session.toml can correct: {', '.join(able) or 'none is'}.")
         keys = ("target", "trials", "parameters", "session_entry")
         asked_of = [{key: able[name][key] for key in keys} for name in wanted]
         with self._one_export:
-            return dict(run_task("correction", str(place.folder), json.dumps(asked_of)))
+            return dict(outputs.run_task("correction", str(place.folder), json.dumps(asked_of)))
 
     def form(self, _: Asked) -> dict[str, Any]:
         """Return what the form for a person's limits asks."""
@@ -190,11 +179,11 @@ class Window:
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""
         with self._one_export:
-            return preview_of_acceptance(self._place(asked), self.archive.out)
+            return outputs.preview_of_acceptance(self._place(asked), self.archive.out)
 
     def keep(self, asked: Asked) -> dict[str, Any]:
         """Keep what was accepted."""
-        return {"folder": str(keep_acceptance(self._place(asked), self.archive.out))}
+        return {"folder": str(outputs.keep_acceptance(self._place(asked), self.archive.out))}
 
     def _place(self, asked: Asked) -> SessionPlace:
         return self.archive[asked.text("name")]

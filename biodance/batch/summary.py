@@ -13,7 +13,7 @@ from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.lab.plain_text import whole_file
 from biodance.library import parse_json
-from biodance.report.files import for_spreadsheets, write_files
+from biodance.report.files import csv_text, write_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +66,7 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     pages = {one.name: f"{SESSIONS}/{folder_name(one.name)}/{_PAGE}" for one in outcomes}
     links = {name: quote(page) for name, page in pages.items() if (folder / page).is_file()}
     page = _page(name, outcomes, table, left_out, links, alike)
-    write_files(folder, {"summary.csv": for_spreadsheets(table).to_csv(index=False, lineterminator="\n"), _PAGE: page})
+    write_files(folder, {"summary.csv": csv_text(table), _PAGE: page})
 
 
 def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
@@ -158,7 +158,6 @@ def _page(
         filters={"signed": signed},
         style=Markup(template_text("page.css") + print_sheet(name, {}, f"biodance {__version__}, {moment(made)}")),
         name=name,
-        version=__version__,
         created=made,
         outcomes=outcomes,
         unread=[one for one in outcomes if one.unread],

@@ -296,24 +296,14 @@ def _examined(
     """Return status, reason and rows of a session that goes through, and the session as read."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
-    from biodance.pipeline.load import as_diagnosed
-    from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
-    from biodance.report.files import write_tables
-    from biodance.report.tables.frames import session_tables
-    from biodance.report.write import write_report
+    from biodance.report.write import write_session
     from biodance.settings import assignments
 
     session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
-    result = examine(session, tell=tell)
-    result, found = diagnosed_and_corrected(result, tell=tell)
-    result = as_diagnosed(result, found.diagnosis) if found else result
-    tell("writing")
-    moved = session_movement(result)
-    document = write_report(result, folder, diagnosis=found, movement=moved, drawn=task.pages)
-    if task.tables:
-        (folder / TABLES).mkdir()
-        write_tables(session_tables(result, found.diagnosis if found else None, moved), folder / TABLES)
+    result, found = diagnosed_and_corrected(examine(session, tell=tell), tell=tell)
+    tables = folder / TABLES if task.tables else None
+    _, document = write_session(result, found, folder, tables=tables, drawn=task.pages, tell=tell)
     first = document["attention"][0]["text"] if document["attention"] else ""
     well = all(row["level"] == "note" for row in document["attention"])
     status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON

@@ -18,19 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.body import parts
 from biodance.body.body import Body
 from biodance.body.changes import place_at_zero, written_in
-from biodance.body.parts import (
-    UPRIGHT,
-    Foot,
-    Joint,
-    JointLimits,
-    RigidInertia,
-    SegmentMarkers,
-    inertial_parameters,
-    parameter_jacobian,
-    turn_inertia,
-)
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, Sip
@@ -68,7 +58,7 @@ def standing_frames(body: Body) -> Body:
     return body
 
 
-def sole_normal(foot: Foot) -> Array:
+def sole_normal(foot: parts.Foot) -> Array:
     """Return the unit normal (3,) of a flat sole upwards, in the frame of the foot."""
     edges = foot.outline - foot.outline.mean(axis=0)
     normal = np.cross(edges, np.roll(edges, -1, axis=0)).sum(axis=0)
@@ -145,40 +135,40 @@ _ROUNDING = 1e-4  # Of the largest moment of inertia: numbers of a file are roun
 _COM_SD = 0.2  # m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3
 
 
-def robot_covariance(lumps: list[RigidInertia], com_sd: list[float]) -> Array:
+def robot_covariance(lumps: list[parts.RigidInertia], com_sd: list[float]) -> Array:
     """Return the covariance (10N, 10N) of the parameters of independent segments, ``com_sd`` (N) m per axis."""
     out = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, (lump, com) in enumerate(zip(lumps, com_sd, strict=True)):
         size = _RELATIVE_INERTIA_SD * np.trace(lump.inertia) / lump.mass / 3
-        jacobian, block = parameter_jacobian(lump), slice(10 * i, 10 * i + 10)
+        jacobian, block = parts.parameter_jacobian(lump), slice(10 * i, 10 * i + 10)
         sd = np.diag([_RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6])
         out[block, block] = jacobian @ sd**2 @ jacobian.T
     return out
 
 
-def is_point(lump: RigidInertia) -> bool:
+def is_point(lump: parts.RigidInertia) -> bool:
     """Whether a lump has no extension: its radius of gyration is below `POINT`."""
     return bool(np.trace(lump.inertia) <= 2 * lump.mass * POINT**2)
 
 
-def extended(lump: RigidInertia, box: Array) -> RigidInertia:
+def extended(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
     """Return the lump, or for a point mass one that fills its ``box`` (2, 3) m: what is left out is unknown."""
     return solid(lump, box) if is_point(lump) else lump
 
 
-def solid(lump: RigidInertia, box: Array) -> RigidInertia:
+def solid(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
     """Return a body of uniform density that fills a ``box`` (2, 3) m, with the lump's mass and centre of mass."""
     square = np.square(box[1] - box[0])
-    return RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
+    return parts.RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
 
 
-def is_possible(lump: RigidInertia) -> bool:
+def is_possible(lump: parts.RigidInertia) -> bool:
     """Whether some body has this mass, centre and inertia."""
     moments = np.linalg.eigvalsh(lump.inertia)
     return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -_ROUNDING * moments[-1])
 
 
-def com_deviation(lump: RigidInertia) -> float:
+def com_deviation(lump: parts.RigidInertia) -> float:
     """Return the standard deviation m per axis of the CoM of a lump of which only the data sheet is known."""
     return float(_COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))
 
@@ -213,15 +203,15 @@ def hoap3() -> Body:
     corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in _SEGMENTS]
     columns = "x_min y_min z_min x_max y_max z_max"
     boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
-    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    phi = np.concatenate([parts.inertial_parameters(lump) for lump in lumps])
     low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
     return Body(
         "HOAP-3",
         _SEGMENTS,
         joints,
         Sip(_SEGMENTS, phi, robot_covariance(lumps, [_CENTRE_SD] * len(lumps))),
-        JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque),
-        SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
+        parts.JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque),
+        parts.SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         boxes,
         feet={side: _sole(side) for side in SIDES},
@@ -229,16 +219,16 @@ def hoap3() -> Body:
     )
 
 
-def _joints() -> tuple[Joint, ...]:
+def _joints() -> tuple[parts.Joint, ...]:
     """Return the 21 joints in the order legs, waist, arms."""
-    joints: list[Joint] = []
+    joints: list[parts.Joint] = []
     z, reach = np.array([0.0, 0.0, 1.0]), 0.0
     for row in read_table("robots", "hoap3_joints").rows:
         name = row["joint"]
         side, _, kind = name.partition("_")
         if name == "waist_pitch":
             carried, y = _SEGMENTS.index("trunk_head"), np.array([0.0, 1.0, 0.0])
-            joints.append(Joint(name, -1, y, UPRIGHT.T, np.zeros(3), carried, "bend forwards"))
+            joints.append(parts.Joint(name, -1, y, parts.UPRIGHT.T, np.zeros(3), carried, "bend forwards"))
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
         tilt = elementary_rotation("x", np.radians(alpha))
@@ -249,11 +239,11 @@ def _joints() -> tuple[Joint, ...]:
             parent, base, place = _base(kind, side, joints)
             rotation, translation = base @ rotation, place + base @ translation
         carried = _SEGMENTS.index(f"{side}_{_CARRIES[kind]}") if kind in _CARRIES else -1
-        joints.append(Joint(name, parent, z, rotation, translation, carried))
+        joints.append(parts.Joint(name, parent, z, rotation, translation, carried))
     return tuple(joints)
 
 
-def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]:
+def _base(kind: str, side: str, joints: list[parts.Joint]) -> tuple[int, Array, Array]:
     """Return the parent joint and the fixed frame (turn, place) at which a leg or an arm starts."""
     z = np.array([0.0, 0.0, 1.0])
     tilt = elementary_rotation("x", -np.pi / 2)
@@ -263,28 +253,28 @@ def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]
     return waist, tilt, _ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
 
 
-def _zero_posture(joints: tuple[Joint, ...]) -> dict[str, Array]:
+def _zero_posture(joints: tuple[parts.Joint, ...]) -> dict[str, Array]:
     """Return lab_R_segment (3, 3) of every segment at zero angles, lab axes x forwards, y left, z up."""
-    turns = {"pelvis": UPRIGHT}
+    turns = {"pelvis": parts.UPRIGHT}
     chain: list[Array] = []
     for joint in joints:
-        chain.append((UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
+        chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
         if joint.segment >= 0:
             turns[_SEGMENTS[joint.segment]] = chain[-1]
     return turns
 
 
-def _lump(row: TableRow, turn: Array) -> RigidInertia:
+def _lump(row: TableRow, turn: Array) -> parts.RigidInertia:
     """Return one segment of the table (lab axes at zero angles) in its own frame."""
     mass, *com = row_numbers(row, "mass_kg com_x com_y com_z")
     xx, yy, zz, xy, xz, yz = row_numbers(row, "Ixx Iyy Izz Ixy Ixz Iyz")
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return turn_inertia(RigidInertia(mass, np.array(com), inertia), turn.T)
+    return parts.turn_inertia(parts.RigidInertia(mass, np.array(com), inertia), turn.T)
 
 
-def _sole(side: str) -> Foot:
+def _sole(side: str) -> parts.Foot:
     """Return the sole in the foot's frame (x up, z forwards), counter-clockwise seen from above."""
     middle = 0.005 if side == "right" else -0.005
     heel, toe = _SOLE_AHEAD
     corners = [(heel, -_SOLE_WIDE), (heel, _SOLE_WIDE), (toe, _SOLE_WIDE), (toe, -_SOLE_WIDE)]
-    return Foot(_SEGMENTS.index(f"{side}_foot"), np.array([[-_ANKLE_HEIGHT, middle + y, z] for z, y in corners]))
+    return parts.Foot(_SEGMENTS.index(f"{side}_foot"), np.array([[-_ANKLE_HEIGHT, middle + y, z] for z, y in corners]))

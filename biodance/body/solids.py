@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import FileRefused
-from biodance.records import Array
+from biodance.records import Array, grouped
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -108,13 +108,10 @@ def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "T
     FileRefused
         The folder is missing, holds a mesh that is named like no segment or two for one, or a mesh cannot be read.
     """
-    from trimesh import Trimesh
     from trimesh.util import concatenate
 
     given = {} if folder is None else _mesh_files(body, Path(folder))
-    parts: dict[str, list[Trimesh]] = {}
-    for index, box in shape_parts(body):
-        parts.setdefault(body.segments[index], []).append(box_solid(box))
+    parts = grouped((body.segments[index], box_solid(box)) for index, box in shape_parts(body))
     made = {name: several[0] if len(several) == 1 else concatenate(several) for name, several in parts.items()}
     return {
         name: read_mesh(given[name]) if name in given else made[name]

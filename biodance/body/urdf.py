@@ -10,20 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance.body import parts
 from biodance.body.body import Body
 from biodance.body.changes import place_at_zero
 from biodance.body.export import refuse_impossible
-from biodance.body.parts import (
-    NO_SEGMENT,
-    Foot,
-    Joint,
-    JointLimits,
-    RigidInertia,
-    SegmentMarkers,
-    combine_inertias,
-    inertial_parameters,
-    turn_inertia,
-)
 from biodance.body.similarity import (
     com_deviation,
     extended,
@@ -46,7 +36,7 @@ class _Carrier:
 
     link: str
     joint: int
-    lumps: list[RigidInertia]
+    lumps: list[parts.RigidInertia]
     shapes: list[Array] = field(default_factory=list)
     hulls: list[Array] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
@@ -92,22 +82,24 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
     return _standing(file, body, {side: owner[foot] for side, foot in zip(SIDES, feet, strict=True)})
 
 
-def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier], *, mend: bool) -> Body:
+def _body(
+    file: UrdfFile, joints: list[parts.Joint], limits: parts.JointLimits, heavy: list[_Carrier], *, mend: bool
+) -> Body:
     """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
     segments = tuple(carrier.link for carrier in heavy)
-    written = [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
+    written = [parts.combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, written, strict=True)])
     lumps = [_possible(lump, box) for lump, box in zip(written, boxes, strict=True)] if mend else written
     com = np.array([lump.com for lump in lumps])[:, None]
-    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    phi = np.concatenate([parts.inertial_parameters(lump) for lump in lumps])
     body = Body(
         file.name,
         segments,
-        tuple(replace(joint, segment=carried.get(j, NO_SEGMENT)) for j, joint in enumerate(joints)),
+        tuple(replace(joint, segment=carried.get(j, parts.NO_SEGMENT)) for j, joint in enumerate(joints)),
         Sip(segments, phi, np.zeros((phi.size, phi.size))),
         limits,
-        SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
+        parts.SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
         notes=_notes(
@@ -125,16 +117,16 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
     return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
 
 
-def _possible(lump: RigidInertia, box: Array) -> RigidInertia:
+def _possible(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
     """Return the inertia, or that of a solid box in its place where no body of its mass can have it."""
     return solid(lump, box) if lump.mass > 0 and not is_possible(lump) else lump
 
 
-def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:
+def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_Carrier], dict[str, _Carrier]]:
     """Return joints, limits, the links that move and, of every link, the one that carries it."""
     first = _Carrier(_root(file), -1, [])
     owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
-    joints, rows, carriers, waiting = list[Joint](), list[Connection](), [first], _on(file, first.link)
+    joints, rows, carriers, waiting = list[parts.Joint](), list[Connection](), [first], _on(file, first.link)
     while waiting:
         c = waiting.pop(0)
         (turn, place), above = frame[c.parent], owner[c.parent]
@@ -142,7 +134,7 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
         if c.kind == "fixed":
             owner[c.child], frame[c.child] = above, (turn, place)
         else:
-            joints.append(Joint(c.name, above.joint, c.axis, turn, place))
+            joints.append(parts.Joint(c.name, above.joint, c.axis, turn, place))
             rows.append(c)
             owner[c.child], frame[c.child] = _Carrier(c.child, len(joints) - 1, []), (np.eye(3), np.zeros(3))
             carriers.append(owner[c.child])
@@ -155,13 +147,13 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
     for name, link in file.links.items():
         (turn, place), carrier = frame[name], owner[name]
         if link.lump is not None:
-            turned = turn_inertia(link.lump, turn)
+            turned = parts.turn_inertia(link.lump, turn)
             carrier.lumps.append(replace(turned, com=turned.com + place))
         carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
         carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
         carrier.unread += link.unread
     table = np.array([[c.lower, c.upper, c.velocity, c.effort] for c in rows]).reshape(-1, 4)
-    return joints, JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3]), carriers, owner
+    return joints, parts.JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3]), carriers, owner
 
 
 def _root(file: UrdfFile) -> str:
@@ -182,7 +174,7 @@ def _on(file: UrdfFile, link: str) -> list[Connection]:
     return [connection for connection in file.connections if connection.parent == link]
 
 
-def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
+def _box(carrier: _Carrier, lump: parts.RigidInertia) -> Array:
     """Return the box (2, 3) m around the shapes of a segment; without any, one with its moments of inertia."""
     corners = carrier.corners
     if corners.size:
@@ -232,7 +224,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
             f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then "
             f"the left one."
         )
-    standing = replace(body, feet={side: Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
+    standing = replace(body, feet={side: parts.Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
     turn = np.stack([ahead, up, sideways], axis=1)
     return standing if np.array_equal(turn, np.eye(3)) else reframed(standing, 0, turn, np.zeros(3))
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from cyclopts import CycloptsError, MissingArgumentError
 
 from biodance.cli import archive, dance, diagnose, files, session, virtual
-from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
+from biodance.cli.shared import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = ["app", "archive", "dance", "diagnose", "files", "main", "run", "session", "virtual"]
 

@@ -6,35 +6,22 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    ForceOption,
-    JsonOption,
-    OutOption,
-    Set,
-    app,
-    print_json,
-    progress,
-    say,
-    show,
-    whole,
-)
+from biodance.cli import shared
 from biodance.cli.session import put_results
 from biodance.errors import without_codes
 
 
-@app.command(name="batch")
+@shared.app.command(name="batch")
 def batch_command(
     archive: Path,
     *,
-    out: OutOption,
-    workers: Annotated[int | None, Parameter(converter=whole)] = None,
+    out: shared.OutOption,
+    workers: Annotated[int | None, Parameter(converter=shared.whole)] = None,
     scheduler: str | None = None,
-    chosen: Set = (),
+    chosen: shared.Set = (),
     pages: Annotated[bool, Parameter(negative="--no-pages")] = True,
     limit: float = 1800.0,
-    json: JsonOption = False,
+    json: shared.JsonOption = False,
 ) -> int:
     """Report every session of an archive, on this machine or on a Dask cluster. An interrupted run is resumed by the
     same command.
@@ -54,24 +41,26 @@ def batch_command(
     """
     from biodance.batch.run import run_batch, summary_of
 
-    with progress() as tell:
+    with shared.progress() as tell:
         found = run_batch(
             archive, out, workers=scheduler or workers, chosen=chosen, pages=pages, limit=limit,
             tell=lambda what, done, of: tell(f"{done} of {of} sessions: {what}"),
         )  # fmt: skip
     if json:
-        print_json(summary_of(found))
+        shared.print_json(summary_of(found))
     else:
         words = {"needs a person": "need a person"}
         sorts = sorted(found.counts.items())
         counts = ", ".join(f"{n} {words.get(sort, sort) if n > 1 else sort}" for sort, n in sorts)
         of = len(found.outcomes)
-        say(f"{of} session{'s' * (of > 1)}: {counts}; {found.fresh} of them in this run. {out / 'report.html'}")
-    return NEEDS_A_PERSON if found.needs_a_person else DONE
+        shared.say(f"{of} session{'s' * (of > 1)}: {counts}; {found.fresh} of them in this run. {out / 'report.html'}")
+    return shared.NEEDS_A_PERSON if found.needs_a_person else shared.DONE
 
 
-@app.command(name="plates")
-def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, force: ForceOption = False) -> int:
+@shared.app.command(name="plates")
+def plates_command(
+    archive: Path, *, out: shared.OutOption, json: shared.JsonOption = False, force: shared.ForceOption = False
+) -> int:
     """Analyse the force plates of one laboratory over all its sessions: trends, change points and outlying sessions.
 
     Parameters
@@ -84,17 +73,17 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     from biodance.pipeline.plates import judge_plates
     from biodance.report.plates import print_plates, write_plates
 
-    with progress() as tell:
+    with shared.progress() as tell:
         place = results_folder(out, archive_folder(archive), force=force)
         found = judge_plates(archive, tell=tell)
         tell("writing the page")
         document = write_plates(found, place.part)
         folder = put_results(place, archive_folder(archive), {})
-    show(document, print_plates, json=json, path=folder / "report.html")
-    return NEEDS_A_PERSON if found.judgement.findings or found.refused else DONE
+    shared.show(document, print_plates, json=json, path=folder / "report.html")
+    return shared.NEEDS_A_PERSON if found.judgement.findings or found.refused else shared.DONE
 
 
-@app.command(name="learn")
+@shared.app.command(name="learn")
 def learn_command(
     archive: Path,
     *,
@@ -103,7 +92,7 @@ def learn_command(
         str,
         Parameter(help="Sessions of healthy people, as S01,S02,S03: normal bands, GPS and GDI."),
     ] = "",
-    json: JsonOption = False,
+    json: shared.JsonOption = False,
 ) -> int:
     """Estimate a laboratory's own tolerances, the usual sizes of errors that are not faults, from fault-free sessions.
 
@@ -119,16 +108,16 @@ def learn_command(
 
     refuse_present(out)
     refuse_missing_folder(out)
-    with progress() as tell:
+    with shared.progress() as tell:
         named = [one.strip() for one in healthy.split(",") if one.strip()]
         found = learn_laboratory(archive, healthy=named, tell=tell)
         write_whole(out, lab_file_text(found).encode())
-    show(learned_document(found), print_learned, json=json, path=out)
-    return NEEDS_A_PERSON if found.left_out else DONE
+    shared.show(learned_document(found), print_learned, json=json, path=out)
+    return shared.NEEDS_A_PERSON if found.left_out else shared.DONE
 
 
-@app.command(name="verify")
-def verify_command(place: Path, *, json: JsonOption = False) -> int:
+@shared.app.command(name="verify")
+def verify_command(place: Path, *, json: shared.JsonOption = False) -> int:
     """Check, years later too, that results are whole, of one run, and of the recordings as they lie there now.
 
     Parameters
@@ -146,7 +135,7 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
         raise BiodanceError(f"{place}: holds no results with a manifest.json (earlier versions wrote none).")
     found = [one for folder in folders if (one := check_results(folder))]
     if json:
-        print_json([{**asdict(one), "folder": str(one.folder), "whole": one.whole} for one in found])
+        shared.print_json([{**asdict(one), "folder": str(one.folder), "whole": one.whole} for one in found])
     for one in () if json else found:
         wrong = {"missing": one.missing, "changed": one.changed, "recordings changed or not there": one.inputs_changed}
         wrong |= {"manifest and results.json differ in": one.otherwise}
@@ -154,4 +143,4 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
         sys.stdout.write(without_codes(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.software}") + "\n")
     if not json and (differ := differing(found)):
         sys.stdout.write(without_codes(f"look: not all of these folders were made alike; {'; '.join(differ)}") + "\n")
-    return DONE if all(one.whole and not one.inputs_changed for one in found) else NEEDS_A_PERSON
+    return shared.DONE if all(one.whole and not one.inputs_changed for one in found) else shared.NEEDS_A_PERSON

@@ -9,25 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    NO_ROBOT,
-    NOBODY,
-    STOPPED,
-    ForceOption,
-    JsonOption,
-    OutOption,
-    PersonFacts,
-    RobotFile,
-    app,
-    not_negative,
-    print_json,
-    say,
-    show,
-    show_place,
-    whole,
-)
+from biodance.cli import shared
 from biodance.errors import BiodanceError, refuse_unknown
 
 if TYPE_CHECKING:
@@ -79,22 +61,24 @@ class DanceAsked:
 USUAL_DANCE, USUAL_LEADING = DanceAsked(), LeadingOptions()
 
 
-@app.command(name="dance")
+@shared.app.command(name="dance")
 def dance_command(
     *,
     asked: DanceAsked = USUAL_DANCE,
-    person: PersonFacts = NOBODY,
-    robot: RobotFile = NO_ROBOT,
+    person: shared.PersonFacts = shared.NOBODY,
+    robot: shared.RobotFile = shared.NO_ROBOT,
     seed: Annotated[
         int,
         Parameter(
-            converter=whole, validator=not_negative, help="Random seed, 0 or more; the same seed gives the same dance."
+            converter=shared.whole,
+            validator=shared.not_negative,
+            help="Random seed, 0 or more; the same seed gives the same dance.",
         ),
     ] = 0,
     leading: LeadingOptions = USUAL_LEADING,
-    out: OutOption,
-    json: JsonOption = False,
-    force: ForceOption = False,
+    out: shared.OutOption,
+    json: shared.JsonOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Design a dance (exciting motion) for one person or robot: safe, balanced and informative about every segment.
 
@@ -114,7 +98,7 @@ def dance_command(
     read_language(leading.language)  # what is wrong with it is said before the long work starts
     plan, able = asked.plan(), read_person(asked.limits) if asked.limits else HEALTHY
     who = _who(person, robot)
-    if isinstance(who, RobotFile):
+    if isinstance(who, shared.RobotFile):
         body, subject = robot_dancer(*who.named(), mend=who.mend), None
     else:
         body, subject = dancer(who, plan), who
@@ -124,27 +108,29 @@ def dance_command(
             unfinished = folder / UNFINISHED
             result = make_dance(body, plan, able, subject=subject, seed=seed, tell=tell, resume=unfinished)
         except KeyboardInterrupt:
-            say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
-            return STOPPED
+            shared.say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
+            return shared.STOPPED
         tell("writing", 0, 0)
         with whole_folder(folder, over=True) as part:
             found = write_dance(result, part, despite=leading.despite, language=leading.language)
-    show(found, print_dance, json=json, path=folder)
+    shared.show(found, print_dance, json=json, path=folder)
     if result.dance is not None and result.dance.unsafe and not leading.despite:
-        say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
+        shared.say(
+            "No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same."
+        )
     if not result.feasible:
-        say(f"There is no such dance. {result.reason}")
-    return DONE if result.feasible and result.complete else NEEDS_A_PERSON
+        shared.say(f"There is no such dance. {result.reason}")
+    return shared.DONE if result.feasible and result.complete else shared.NEEDS_A_PERSON
 
 
-@app.command(name="limits")
+@shared.app.command(name="limits")
 def limits_command(
     *,
     template: Annotated[
         str, Parameter(help="Whose limits: stroke, hip_tep (a new hip), parkinson, child, old or amputee.")
     ],
     out: Annotated[Path, Parameter(help="Output file, e.g. person.toml.")],
-    force: ForceOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Write a commented file of one person's limits, to be changed and given to `biodance dance --limits`."""
     from biodance.lab.plain_text import write_whole
@@ -155,17 +141,17 @@ def limits_command(
     refuse_unknown("template of limits", template, legal)
     refuse_file(out, force=force)
     write_whole(out, (folder("protocols") / "limits" / f"{template}.toml").read_bytes(), over=force)
-    show_place(out)
-    return DONE
+    shared.show_place(out)
+    return shared.DONE
 
 
-@app.command(name="feedback")
+@shared.app.command(name="feedback")
 def feedback_command(
     dance: Path,
     *,
     leading: LeadingOptions = USUAL_LEADING,
     out: FileOut,
-    force: ForceOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Write a page that guides a person through a dance: one HTML file that opens in a browser without a network.
 
@@ -184,20 +170,22 @@ def feedback_command(
 
     one = Dance.load(dance)
     if not write_feedback(one, out, force=force, despite=leading.despite, language=leading.language):
-        say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
-    show_place(out)
-    return DONE
+        shared.say(
+            "The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm)."
+        )
+    shared.show_place(out)
+    return shared.DONE
 
 
-@app.command(name="play")
+@shared.app.command(name="play")
 def play_command(
     dance: Path,
     *,
     out: Annotated[Path, Parameter(help="Output video: .gif, or .mp4 if ffmpeg is installed.")],
     hold: Annotated[float, Parameter(help="Longest time a posture is held, s.")] = 0.5,
     friction: Annotated[float, Parameter(help="Friction coefficient of the soles on the floor.")] = 0.5,
-    json: JsonOption = False,
-    force: ForceOption = False,
+    json: shared.JsonOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Simulate a designed dance in MuJoCo with a free-standing body, and render it as a video next to the plan.
 
@@ -220,10 +208,10 @@ def play_command(
         tell("drawing the film", 0, 0)
         write_film(found, place)
     if json:
-        print_json(playback_document(found, place))
+        shared.print_json(playback_document(found, place))
     else:
         sys.stdout.write(f"{found.table()}\n{place}\n")
-    return NEEDS_A_PERSON if found.broken else DONE
+    return shared.NEEDS_A_PERSON if found.broken else shared.DONE
 
 
 def _sides(plate: str) -> tuple[float, float]:
@@ -238,7 +226,7 @@ def _sides(plate: str) -> tuple[float, float]:
     return side, ahead
 
 
-def _who(person: PersonFacts, robot: RobotFile) -> "Subject | RobotFile":
+def _who(person: shared.PersonFacts, robot: shared.RobotFile) -> "Subject | shared.RobotFile":
     """Return the person or the robot; BiodanceError if it is neither or both."""
     from biodance.records import Subject
 

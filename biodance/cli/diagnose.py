@@ -6,34 +6,21 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    NO_ROBOT,
-    USUAL_READING,
-    ForceOption,
-    JsonOption,
-    Reading,
-    Results,
-    RobotFile,
-    app,
-    progress,
-    show,
-)
-from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results, tabled
+from biodance.cli import shared
+from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results
 
 if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult
     from biodance.pipeline.robot import RobotResult
 
 
-@app.command(name="foresee")
+@shared.app.command(name="foresee")
 def foresee_command(
     dance: Path,
     *,
     out: Annotated[Path | None, Parameter(help="Also write the forecast as a page, e.g. foresee.html.")] = None,
-    json: JsonOption = False,
-    force: ForceOption = False,
+    json: shared.JsonOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Predict, before recording, what a designed dance can detect: the detection limit of every cause, which causes it
     cannot tell apart, and what to change so that it detects more.
@@ -49,7 +36,7 @@ def foresee_command(
     from biodance.report.tables.diagnosis import foresight_document
     from biodance.report.terminal import print_foresight
 
-    with progress() as tell:
+    with shared.progress() as tell:
         tell("foreseeing what the dance will see")
         if out is not None:
             refuse_page(out, force=force)
@@ -59,16 +46,16 @@ def foresee_command(
         if out is not None:
             page = foresight_page(document, f"the dance “{one.protocol}”" if one.protocol else "the dance")
             write_files(out.parent, {out.name: page})
-    show(document, print_foresight, json=json)
-    return DONE
+    shared.show(document, print_foresight, json=json)
+    return shared.DONE
 
 
-@app.command(name="diagnose")
+@shared.app.command(name="diagnose")
 def diagnose_command(
     session: Path,
     *,
-    results: Results,
-    reading: Reading = USUAL_READING,
+    results: shared.Results,
+    reading: shared.Reading = shared.USUAL_READING,
     accept: Annotated[
         bool,
         Parameter(
@@ -76,7 +63,7 @@ def diagnose_command(
             "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed."
         ),
     ] = False,
-    robot: RobotFile = NO_ROBOT,
+    robot: shared.RobotFile = shared.NO_ROBOT,
 ) -> int:
     """Diagnose why measured and simulated ground forces differ: the causes, their sizes with uncertainty, possible
     alternatives, and how much of the residual each cause explains.
@@ -91,16 +78,17 @@ def diagnose_command(
         from biodance.report.robot import print_robot_diagnosis
 
         told, folder, document = examine_robot(session, results, robot, for_people)
-        show(document, print_robot_diagnosis, json=results.json, path=folder / "report.html")
-        return NEEDS_A_PERSON if told.needs_a_person else DONE
+        shared.show(document, print_robot_diagnosis, json=results.json, path=folder / "report.html")
+        return shared.NEEDS_A_PERSON if told.needs_a_person else shared.DONE
     from biodance.pipeline import front
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
+    from biodance.report.tables.frames import write_session_tables
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
-    with progress() as tell:
+    with shared.progress() as tell:
         tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
         result, before, place = examine_with_reference(session, reading, results, tell)
         recorded, folder = result.session, place.part
@@ -109,16 +97,16 @@ def diagnose_command(
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
-        tabled(result, tables, found.diagnosis, movement=moved)
+        write_session_tables(tables, result, found.diagnosis, movement=moved)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
         folder = put_session_results(place, recorded)
     results.show_page(folder)
-    show(document, print_diagnosis, json=results.json, path=folder / "report.html")
-    return NEEDS_A_PERSON if document["failures"] else exit_code(document)
+    shared.show(document, print_diagnosis, json=results.json, path=folder / "report.html")
+    return shared.NEEDS_A_PERSON if document["failures"] else exit_code(document)
 
 
 def examine_robot(
-    recording: Path, results: Results, robot: RobotFile, for_people: tuple[str, ...]
+    recording: Path, results: shared.Results, robot: shared.RobotFile, for_people: tuple[str, ...]
 ) -> "tuple[RobotResult, Path, dict[str, Any]]":
     """Return what a recording says, the folder it is written to, and its numbers; options ``for_people`` are
     refused.
@@ -132,7 +120,7 @@ def examine_robot(
     urdf, feet = robot.named()
     if for_people:
         raise BiodanceError(f"{', '.join(for_people)} cannot be used with --urdf: they are for sessions of people.")
-    with progress() as tell:
+    with shared.progress() as tell:
         both = named_feet(feet)
         place = results_folder(results.out, recording, force=results.force)
         result = identify_robot(recording, urdf=urdf, feet=both, mend=robot.mend, tell=tell)
@@ -143,12 +131,12 @@ def examine_robot(
     return result, folder, found
 
 
-@app.command(name="identify")
+@shared.app.command(name="identify")
 def identify_command(
     session: Path,
     *,
-    results: Results,
-    reading: Reading = USUAL_READING,
+    results: shared.Results,
+    reading: shared.Reading = shared.USUAL_READING,
     dance: Annotated[
         Path | None,
         Parameter(help="dance.npz that the person followed; reports how well it was performed."),
@@ -157,7 +145,7 @@ def identify_command(
         Literal["posterior", "paper"],
         Parameter(help="posterior: with intervals; paper: the quadratic programme of Bonnet 2016, beside it."),
     ] = "posterior",
-    robot: RobotFile = NO_ROBOT,
+    robot: shared.RobotFile = shared.NO_ROBOT,
 ) -> int:
     """Identify segment masses with credible intervals, validate them on held-out trials, and search for an added mass.
 
@@ -178,9 +166,10 @@ def identify_command(
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import by_paper, identification_of
+    from biodance.report.tables.frames import write_session_tables
     from biodance.report.write import write_identification
 
-    with progress() as tell:
+    with shared.progress() as tell:
         tables = results.make_tables_folder(session)
         shown = None if dance is None else Dance.load(dance)
         result, before, place = examine_with_reference(session, reading, results, tell, dance=shown)
@@ -195,7 +184,7 @@ def identify_command(
         checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tell("writing the page")
-        tabled(result, tables, movement=moved)
+        write_session_tables(tables, result, movement=moved)
         document = write_identification(result, found, place.part, checks=checks, movement=moved)
         folder = put_session_results(place, result.session)
     results.show_page(folder)
@@ -206,5 +195,5 @@ def _told_identified(result: "SessionResult | RobotResult", folder: Path, found:
     """Print what was identified and return the exit code."""
     from biodance.report.terminal import print_identification
 
-    show(found, print_identification, json=json, path=folder / "report.html")
+    shared.show(found, print_identification, json=json, path=folder / "report.html")
     return exit_code(found)

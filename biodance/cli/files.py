@@ -8,30 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    NOT_DONE,
-    ForceOption,
-    JsonOption,
-    MarkersFile,
-    Set,
-    SubjectOption,
-    app,
-    print_json,
-    progress,
-    say,
-    show,
-    show_place,
-    whole,
-)
+from biodance.cli import shared
 
 if TYPE_CHECKING:
     from biodance.diagnosis.watch import LiveWarning
     from biodance.pipeline.live import LiveState
 
 
-@app.command(name="register")
+@shared.app.command(name="register")
 def register_command(
     markers: Path,
     forces: Path,
@@ -41,8 +25,8 @@ def register_command(
         bool,
         Parameter(help="Write the session even if the registration is less certain than 5 mm, 0.5 deg or 5 ms."),
     ] = False,
-    json: JsonOption = False,
-    force: ForceOption = False,
+    json: shared.JsonOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Register a force file to a marker file: estimate the position, rotation and time delay of the plates from the
     movement, and write both as one session.
@@ -56,39 +40,39 @@ def register_command(
     """
     from biodance.pipeline.front import register
 
-    with progress() as tell:
+    with shared.progress() as tell:
         found = register(markers, forces, out, rough=rough, force=force, tell=tell)
     if json:
-        print_json(found.document())
+        shared.print_json(found.document())
     else:
         sys.stdout.write(f"{found}\n" + "".join(f"{note}\n" for note in found.notes))
     if found.status == "refused":
-        say(found.reason)
-        return NOT_DONE if found.pose is None else NEEDS_A_PERSON
+        shared.say(found.reason)
+        return shared.NOT_DONE if found.pose is None else shared.NEEDS_A_PERSON
     if not json:
-        show_place(out)
+        shared.show_place(out)
     if found.status == "rough":
-        say(found.reason)
-        return NEEDS_A_PERSON
-    return DONE
+        shared.say(found.reason)
+        return shared.NEEDS_A_PERSON
+    return shared.DONE
 
 
-@app.command(name="doctor")
-def doctor_command(*, json: JsonOption = False) -> int:
+@shared.app.command(name="doctor")
+def doctor_command(*, json: shared.JsonOption = False) -> int:
     """Check the installation, and explain how to fix what does not work."""
     from dataclasses import asdict
 
     from biodance.doctor import examine_machine
     from biodance.report.terminal import print_findings
 
-    with progress() as tell:
+    with shared.progress() as tell:
         findings = examine_machine(tell=tell)
-    show([asdict(one) for one in findings] if json else findings, print_findings, json=json)
-    return DONE if all(finding.works for finding in findings if finding.needed) else NEEDS_A_PERSON
+    shared.show([asdict(one) for one in findings] if json else findings, print_findings, json=json)
+    return shared.DONE if all(finding.works for finding in findings if finding.needed) else shared.NEEDS_A_PERSON
 
 
-@app.command(name="init")
-def init_command(session: Path, *, subject: str | None = None, json: JsonOption = False) -> int:
+@shared.app.command(name="init")
+def init_command(session: Path, *, subject: str | None = None, json: shared.JsonOption = False) -> int:
     """Create session.toml with the detected and guessed metadata of a session (subject, trial roles, markers, plates)
     for review. An existing session.toml is never overwritten.
 
@@ -103,13 +87,16 @@ def init_command(session: Path, *, subject: str | None = None, json: JsonOption 
     from biodance.report.terminal import print_initialised
 
     found = init_session(session, subject_name=subject)
-    show(found, print_initialised, json=json)
-    return NEEDS_A_PERSON if found["refused"] or not found["marker_set"] else DONE
+    shared.show(found, print_initialised, json=json)
+    return shared.NEEDS_A_PERSON if found["refused"] or not found["marker_set"] else shared.DONE
 
 
-@app.command(name="inspect")
+@shared.app.command(name="inspect")
 def inspect_command(
-    *paths: Path, subject: SubjectOption = None, markers: MarkersFile = None, json: JsonOption = False
+    *paths: Path,
+    subject: shared.SubjectOption = None,
+    markers: shared.MarkersFile = None,
+    json: shared.JsonOption = False,
 ) -> int:
     """Show the contents of recordings: markers, gaps, plates, the load on them, and every decision made on reading.
 
@@ -121,19 +108,19 @@ def inspect_command(
     from biodance.lab.inspect import inspect_paths
     from biodance.report.terminal import print_inspected
 
-    with progress() as tell:
+    with shared.progress() as tell:
         records = inspect_paths(paths, subject=subject, markers=markers, tell=tell)
-    show(records, print_inspected, json=json)
+    shared.show(records, print_inspected, json=json)
     states = {record["status"] for record in records}
     if states == {"refused"}:
         more = f" Nor can the other {len(records) - 1}." if len(records) > 1 else ""
-        say(f"{records[0]['reason']}{more}")
-        return NOT_DONE
-    return NEEDS_A_PERSON if states - {"ok"} else DONE
+        shared.say(f"{records[0]['reason']}{more}")
+        return shared.NOT_DONE
+    return shared.NEEDS_A_PERSON if states - {"ok"} else shared.DONE
 
 
-@app.command
-def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption = False) -> int:
+@shared.app.command
+def settings(session: Path | None = None, *, chosen: shared.Set = (), json: shared.JsonOption = False) -> int:
     """Print all settings with value, unit, meaning and allowed range, in the format of session.toml.
 
     Parameters
@@ -148,13 +135,13 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption 
     usual = read_session_file(session_folder(session)).settings if session else USUAL
     found = usual.changed(assignments(chosen))
     if json:
-        print_json([row._asdict() for row in found.all()])
+        shared.print_json([row._asdict() for row in found.all()])
     else:
         sys.stdout.write(found.to_toml())
-    return DONE
+    return shared.DONE
 
 
-@app.command(name="export")
+@shared.app.command(name="export")
 def export_command(
     source: Path,
     *,
@@ -166,12 +153,12 @@ def export_command(
     ],
     out: Annotated[Path, Parameter(help="Output file, or folder for opensim and bids.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial to export, for trial formats.")] = None,
-    subject: SubjectOption = None,
+    subject: shared.SubjectOption = None,
     meshes: Annotated[
         Path | None,
         Parameter(help="Folder with one closed mesh per segment (right_thigh.stl, in m), for glb and osim."),
     ] = None,
-    markers: MarkersFile = None,
+    markers: shared.MarkersFile = None,
     force: Annotated[bool, Parameter(help="Overwrite an existing file.")] = False,
 ) -> int:
     """Export a session, or the results of `biodance identify`, to the format of another program.
@@ -189,16 +176,16 @@ def export_command(
     if format not in FOLDERS:
         refuse_file(out, force=force)
     replaced = whole_file(out, over=True) if force and out.is_file() else nullcontext(out)
-    with progress() as tell, replaced as place:
+    with shared.progress() as tell, replaced as place:
         _, sentence = write(
             source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell
         )
-    say(sentence)
-    show_place(out)
-    return DONE
+    shared.say(sentence)
+    shared.show_place(out)
+    return shared.DONE
 
 
-@app.command(name="live")
+@shared.app.command(name="live")
 def live_command(
     file: Path,
     *,
@@ -208,12 +195,12 @@ def live_command(
         Parameter(help="Replay at the recorded frame rate instead of as fast as possible."),
     ] = False,
     subject: str | None = None,
-    markers: MarkersFile = None,
-    chosen: Set = (),
+    markers: shared.MarkersFile = None,
+    chosen: shared.Set = (),
     page: Annotated[
         int | None, Parameter(help="Also serve a live page on this port of 127.0.0.1; 0 picks a free port.")
     ] = None,
-    json: JsonOption = False,
+    json: shared.JsonOption = False,
 ) -> int:
     """Replay a recording frame by frame: track, monitor for faults and identify while it runs.
 
@@ -228,9 +215,9 @@ def live_command(
     from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line
     from biodance.settings import assignments
 
-    with progress() as tell, LivePage(page) if page is not None else nullcontext() as shown:
+    with shared.progress() as tell, LivePage(page) if page is not None else nullcontext() as shown:
         if shown:
-            say(f"Open {shown.address} on this machine.")
+            shared.say(f"Open {shown.address} on this machine.")
 
         def tell_state(state: "LiveState") -> None:
             tell(state_line(state))
@@ -238,7 +225,7 @@ def live_command(
                 shown.show(state)
 
         def tell_warning(said: "LiveWarning") -> None:
-            say(warning_line(said))
+            shared.say(warning_line(said))
             if shown:
                 shown.warn(said)
 
@@ -251,18 +238,18 @@ def live_command(
         if shown:
             shown.end(found.state, found.cause)
     document = live_document(found)
-    show(document, partial(print_live, found), json=json)
-    return NEEDS_A_PERSON if found.warnings or found.cause else DONE
+    shared.show(document, partial(print_live, found), json=json)
+    return shared.NEEDS_A_PERSON if found.warnings or found.cause else shared.DONE
 
 
-@app.command(name="app")
+@shared.app.command(name="app")
 def app_command(
     folder: Path | None = None,
     *,
     out: Annotated[
         Path | None, Parameter(help="Folder of the results; default: FOLDER-results beside the folder.")
     ] = None,
-    port: Annotated[int, Parameter(converter=whole, help="Port of 127.0.0.1; 0 takes a free one.")] = 0,
+    port: Annotated[int, Parameter(converter=shared.whole, help="Port of 127.0.0.1; 0 takes a free one.")] = 0,
     browser: Annotated[
         bool, Parameter(negative=("--no-browser", "--no-open"), help="Open the window in the browser.")
     ] = True,
@@ -284,7 +271,7 @@ def app_command(
     def tell(address: str) -> None:
         sys.stdout.write(f"{address}\n")
         sys.stdout.flush()
-        say(f"The window over {place} is open; its results go to {results}. Ctrl-C ends it.")
+        shared.say(f"The window over {place} is open; its results go to {results}. Ctrl-C ends it.")
 
     serve_window(place, results, port=port, opened=browser, tell=tell)
-    return DONE
+    return shared.DONE

@@ -7,30 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    STOPPED,
-    USUAL_READING,
-    ForceOption,
-    JsonOption,
-    OutOption,
-    Reading,
-    Results,
-    app,
-    progress,
-    say,
-    show,
-)
+from biodance.cli import shared
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from biodance.dance.dance import Dance
-    from biodance.diagnosis.diagnosis import Diagnosis
     from biodance.lab.session.results_folder import ResultsFolder
     from biodance.pipeline.identification import SessionIdentification
-    from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
     from biodance.settings import Value
@@ -46,15 +30,11 @@ def report_session(
     lab: Path | None = None,
     for_subject: str | None = None,
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
-    person who was measured in that language; return the result and the content of results.json.
-    """
+    """Diagnose an examined session and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.load import as_diagnosed
-    from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
-    from biodance.report.write import write_report, write_subject_page
+    from biodance.report.write import write_session
 
     found = None
     try:
@@ -63,52 +43,29 @@ def report_session(
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
-    result = as_diagnosed(result, found.diagnosis) if found else result
-    moved = describe_movement(result, lab=lab, tell=tell)
-    tell("writing the page")
-    tabled(result, tables, found.diagnosis if found else None, movement=moved)
-    if for_subject:
-        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
-    return result, write_report(result, folder, diagnosis=found, movement=moved)
-
-
-def tabled(
-    result: "SessionResult",
-    folder: Path | None,
-    diagnosis: "Diagnosis | None" = None,
-    *,
-    movement: "SessionMovement | None" = None,
-) -> None:
-    """Write the tables of a result in the place of those that its folder holds; nothing without one."""
-    from biodance.lab.session.results_folder import whole_folder
-    from biodance.report.files import write_tables
-    from biodance.report.tables.frames import session_tables
-
-    if folder is not None:
-        with whole_folder(folder, over=True) as part:
-            write_tables(session_tables(result, diagnosis, movement), part)
+    return write_session(result, found, folder, tables=tables, lab=lab, for_subject=for_subject, tell=tell)
 
 
 def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
     """Print what was reported and return the exit code."""
     from biodance.report.terminal import print_session
 
-    show(found, partial(print_session, result), json=json, path=folder / "report.html")
+    shared.show(found, partial(print_session, result), json=json, path=folder / "report.html")
     if result.stopped:
-        say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
-        return STOPPED
+        shared.say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
+        return shared.STOPPED
     return exit_code(found)
 
 
 def exit_code(found: "dict[str, Any]") -> int:
     """Return the exit code of a document: whether somebody must act on anything that it says must be seen."""
-    return DONE if all(row["level"] == "note" for row in found["attention"]) else NEEDS_A_PERSON
+    return shared.DONE if all(row["level"] == "note" for row in found["attention"]) else shared.NEEDS_A_PERSON
 
 
 def examine_with_reference(
     session: Path,
-    reading: Reading,
-    results: Results,
+    reading: shared.Reading,
+    results: shared.Results,
     tell: "Callable[[str], None]",
     *,
     dance: "Dance | None" = None,
@@ -136,7 +93,7 @@ def examine_with_reference(
         from biodance.pipeline.dance import plates_too_small
 
         if why := plates_too_small(dance, recording):
-            say(f"look: {why}")
+            shared.say(f"look: {why}")
     if earlier is not None:
         from biodance.pipeline.front import identify
 
@@ -144,12 +101,12 @@ def examine_with_reference(
     return examine(recording, reference=before, known=known, tell=tell), before, place
 
 
-@app.command(name="report")
+@shared.app.command(name="report")
 def report_command(
     session: Path,
     *,
-    results: Results,
-    reading: Reading = USUAL_READING,
+    results: shared.Results,
+    reading: shared.Reading = shared.USUAL_READING,
     subject_page: Annotated[
         bool,
         Parameter(help="Also write subject.html, a plain-language page for the person measured."),
@@ -171,7 +128,7 @@ def report_command(
     spoken = language or (ENGLISH if subject_page else None)
     if spoken:
         read_language(spoken)  # what is wrong with it is said before the long work starts
-    with progress() as tell:
+    with shared.progress() as tell:
         tables = results.make_tables_folder(session)
         result, before, place = examine_with_reference(session, reading, results, tell)
         result, found = report_session(
@@ -182,12 +139,12 @@ def report_command(
     return print_reported(result, folder, found, results.json)
 
 
-@app.command(name="compare")
+@shared.app.command(name="compare")
 def compare_command(
     *visits: Path,
-    out: OutOption,
-    json: JsonOption = False,
-    force: ForceOption = False,
+    out: shared.OutOption,
+    json: shared.JsonOption = False,
+    force: shared.ForceOption = False,
 ) -> int:
     """Compare two or more visits of one person: what changed from the first to the last beyond its uncertainty.
 
@@ -200,7 +157,7 @@ def compare_command(
     from biodance.pipeline.visits import compare_visits, read_visits
     from biodance.report.visits import COMPARE_PAGE, print_compared, write_visits
 
-    with progress() as tell:
+    with shared.progress() as tell:
         sessions = read_visits(visits, tell=tell)
         for one in sessions:  # the results lie among the recordings of none of them
             place = results_folder(out, one.folder, force=force)
@@ -209,7 +166,7 @@ def compare_command(
         document = write_visits(found, place.part)
         inputs = {trial.source.path: trial.source.sha256 for one in sessions for trial in one.trials}
         folder = put_results(place, sessions[0].folder, inputs)
-    show(document, partial(print_compared, found), json=json, path=folder / COMPARE_PAGE)
+    shared.show(document, partial(print_compared, found), json=json, path=folder / COMPARE_PAGE)
     return exit_code(document)
 
 
@@ -229,5 +186,5 @@ def put_results(
 
     kept = place.finish(source, inputs_of(inputs, source), settings or {})
     if kept is not None:
-        say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
+        shared.say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
     return place.place

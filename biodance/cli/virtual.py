@@ -8,20 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NOBODY,
-    ForceOption,
-    JsonOption,
-    OutOption,
-    PersonFacts,
-    app,
-    not_negative,
-    progress,
-    show,
-    show_place,
-    whole,
-)
+from biodance.cli import shared
 from biodance.cli.session import print_reported, put_session_results, report_session
 
 
@@ -35,8 +22,8 @@ class Drawn:
     seed: Annotated[
         int,
         Parameter(
-            converter=whole,
-            validator=not_negative,
+            converter=shared.whole,
+            validator=shared.not_negative,
             help="Random seed, 0 or more; the same seed gives the same person and the same files.",
         ),
     ]
@@ -52,14 +39,14 @@ class Drawn:
     lab_seed: Annotated[
         int | None,
         Parameter(
-            converter=whole,
-            validator=not_negative,
+            converter=shared.whole,
+            validator=shared.not_negative,
             help="Random seed of the laboratory (plates, cameras, soft tissue, tolerances), 0 or more.",
         ),
     ] = None
 
 
-@app.command(name="simulate")
+@shared.app.command(name="simulate")
 def simulate_command(
     *,
     protocol: str | None = None,
@@ -69,10 +56,10 @@ def simulate_command(
             help="dance.npz of `biodance dance`, performed instead of a protocol; the person defaults to its own."
         ),
     ] = None,
-    person: PersonFacts = NOBODY,
+    person: shared.PersonFacts = shared.NOBODY,
     drawn: Drawn,
-    out: OutOption,
-    force: ForceOption = False,
+    out: shared.OutOption,
+    force: shared.ForceOption = False,
 ) -> int:
     """Simulate a session: C3D files and session.toml as from a real laboratory, and the true values in truth/.
 
@@ -86,18 +73,18 @@ def simulate_command(
 
     shown = None if dance is None else Dance.load(dance)
     who = front_dance.virtual_subject(shown, sex=person.sex, height=person.height, mass=person.mass, age=person.age)
-    with progress() as tell, _simulated_anew(out, force=force) as place:
+    with shared.progress() as tell, _simulated_anew(out, force=force) as place:
         tell(f"simulating {protocol or dance}")
         front_dance.simulate(
             who, protocol, place, seed=drawn.seed, effects=drawn.effect, dance=shown, performer=drawn.performer,
             lab_seed=drawn.lab_seed,
         )  # fmt: skip
-    show_place(out)
-    return DONE
+    shared.show_place(out)
+    return shared.DONE
 
 
-@app.command(name="effects")
-def effects_command(name: str | None = None, *, json: JsonOption = False) -> int:
+@shared.app.command(name="effects")
+def effects_command(name: str | None = None, *, json: shared.JsonOption = False) -> int:
     """List the causes of disagreement that are looked for: parameters with units, and which can be simulated.
 
     Parameters
@@ -110,12 +97,12 @@ def effects_command(name: str | None = None, *, json: JsonOption = False) -> int
     from biodance.report.terminal import print_table
 
     document = causes_document(causes(None if name is None else [name]).values())
-    show(document, lambda rows, console: print_table(CAUSE_ROW, causes_shown(rows), console), json=json)
-    return DONE
+    shared.show(document, lambda rows, console: print_table(CAUSE_ROW, causes_shown(rows), console), json=json)
+    return shared.DONE
 
 
-@app.command(name="demo")
-def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -> int:
+@shared.app.command(name="demo")
+def demo_command(*, out: shared.OutOption = Path("demo"), force: shared.ForceOption = False) -> int:
     """Simulate a short session with known true values, and report it like a real one."""
     from biodance.lab.session.read import read_session
     from biodance.lab.session.results_folder import results_folder
@@ -124,7 +111,7 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
     session = out / "simulated_session"
-    with progress() as tell:
+    with shared.progress() as tell:
         tell("simulating a session")
         with _simulated_anew(session, force=force) as fresh:
             write_session(Subject(62.0, 1.70, "F", 31.0), "short", fresh, seed=1)

@@ -13,7 +13,7 @@ from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
 from biodance.motion.soles import Soles
-from biodance.records import SIDES, Array, Mask, Motion, Sip, Wrench, freeze
+from biodance.records import SIDES, Array, Mask, Motion, Sip, Wrench, freeze, grouped
 from biodance.records.motion import BY_FRAME
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import zero_moment_point
@@ -73,10 +73,8 @@ def over_cycle(
 
 def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
     """Return the curves of the same kind, quantity and side together, in the order in which they come."""
-    same: dict[tuple[str, str, str], list[CycleCurve]] = {}
-    for one in curves:
-        same.setdefault((one.cycle.kind, one.quantity, one.side), []).append(one)
     groups = []
+    same = grouped(((one.cycle.kind, one.quantity, one.side), one) for one in curves)
     for (kind, quantity, side), some in same.items():
         values = np.stack([one.value for one in some])
         parameters_sd, _ = mean_and_sd(np.stack([one.sd for one in some]))

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.cycles import cut
 from biodance.cycles.beside import (
     AngleComparison,
     EventComparison,
@@ -25,18 +26,6 @@ from biodance.cycles.curves import (
     group_curves,
     lab_curves,
     load_curves,
-)
-from biodance.cycles.cut import (
-    PERCENT,
-    Cycle,
-    agreement_of_events,
-    foot_events,
-    gait_cycles,
-    is_left_out,
-    joined_events,
-    kinematic_events,
-    repetitions,
-    replaced_events,
 )
 from biodance.cycles.lifts import jumps, lift
 from biodance.cycles.strides import Stride, mean_values, strides
@@ -81,7 +70,7 @@ class TrialMovement:
 
     trial: str
     events: tuple[FootEvent, ...]
-    cycles: tuple[Cycle, ...]
+    cycles: tuple[cut.Cycle, ...]
     curves: tuple[CycleCurve, ...]
     strides: tuple[Stride, ...]
     late: tuple[Array, Array]
@@ -89,7 +78,7 @@ class TrialMovement:
     file_events: tuple[EventComparison, ...] = ()
     file_curves: tuple[CycleCurve, ...] = ()
     lifts: tuple[Stride, ...] = ()
-    shared: tuple[Cycle, ...] = ()
+    shared: tuple[cut.Cycle, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -166,7 +155,7 @@ class TrialMovement:
             (one.kind, one.quantity, one.side, one.unit, float(percent), int(count), *values)
             for one in self.groups
             for percent, count, *values in zip(
-                PERCENT, np.isfinite(one.values).sum(axis=0), one.mean, one.sd, one.parameters_sd, strict=True
+                cut.PERCENT, np.isfinite(one.values).sum(axis=0), one.mean, one.sd, one.parameters_sd, strict=True
             )
         ]
         return pd.DataFrame(rows, columns=columns)
@@ -215,15 +204,15 @@ def trial_movement(
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
-    force = foot_events(feet, contact) if contact is not None and feet is not None else ()
-    markers = kinematic_events(body, motion)
-    events = replaced_events(joined_events(force, markers) if markers else (), trial.events)
+    force = cut.foot_events(feet, contact) if contact is not None and feet is not None else ()
+    markers = cut.kinematic_events(body, motion)
+    events = cut.replaced_events(cut.joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
     known_of_feet, shared = _known_feet(contact, motion.time.size)
     jumped = jumps(trial.name, motion, soles, centre, feet, known_of_feet)
-    lifts = (one for one in repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
-    found = (*gait_cycles(trial.name, events), *lifts, *jumped)
-    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
+    lifts = (one for one in cut.repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
+    found = (*cut.gait_cycles(trial.name, events), *lifts, *jumped)
+    cycles = tuple(one for one in found if not cut.is_left_out(one, trial.left_out))
     whole = np.asarray(known_of_feet.all(axis=1))
     sure = whole & ~shared
     on_one = [one for one in cycles if shared[(motion.time >= one.start) & (motion.time <= one.end)].any()]
@@ -244,7 +233,7 @@ def trial_movement(
         cycles,
         tuple(curves),
         strides(cycles, events, body, soles, centre),
-        agreement_of_events(force, markers),
+        cut.agreement_of_events(force, markers),
         compare_angles(body, motion, outputs),
         compare_events(events, outputs),
         tuple(theirs),
@@ -263,7 +252,7 @@ def _known_feet(contact: Contact | None, frames: int) -> tuple[Mask, Mask]:
     return contact.told, np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
 
 
-def _notes(cycles: Sequence[Cycle], on_one: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+def _notes(cycles: Sequence[cut.Cycle], on_one: Sequence[cut.Cycle], contact: Contact | None) -> tuple[str, ...]:
     """Return what a person should know of the ``cycles``, of which ``on_one`` had both feet on one plate."""
     if not cycles:
         return ("No step, no squat, no rise from a chair and no jump was found, so there are no cycles.",)

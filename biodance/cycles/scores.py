@@ -10,7 +10,7 @@ from biodance.cycles.curves import WHOLE, CurveGroup, CycleCurve, mean_and_sd
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.summary import Spread, spread
 from biodance.errors import BiodanceError
-from biodance.records import SIDES, Array, freeze
+from biodance.records import SIDES, Array, freeze, grouped
 
 SCORE_ANGLES = (
     *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
@@ -49,13 +49,12 @@ def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCur
 
     ``people`` by name, with the curves of all their trials; a person's own mean is over trials and sides.
     """
-    means: dict[tuple[str, str, str], dict[str, list[Array]]] = {}
-    for name, groups in people.items():
-        for one in groups:
-            means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
+    every = ((name, one) for name, groups in people.items() for one in groups)
+    means = grouped(((one.kind, one.quantity, one.unit), (name, one.mean)) for name, one in every)
     bands = []
     for (kind, quantity, unit), own in means.items():
-        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
+        of_people = [mean_and_sd(np.stack(some))[0] for some in grouped(own).values()]
+        whole = [mean for mean in of_people if np.isfinite(mean).mean() > 0.9]
         if len(whole) >= _FEWEST_PEOPLE:
             bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
     return tuple(bands)

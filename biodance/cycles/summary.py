@@ -15,7 +15,7 @@ from biodance.cycles.keys import KeyValue, key_values
 from biodance.cycles.lifts import LIFT_UNITS
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import STRIDE_UNITS, Stride, mean_values
-from biodance.records import SIDES
+from biodance.records import SIDES, grouped
 from biodance.uncertainty.visits import change_of_mean, visit_mean
 
 _TURNS = 20.0
@@ -147,7 +147,8 @@ class Repetitions:
     @cached_property
     def keys(self) -> tuple[KeySummary, ...]:
         """The key values of both sides beside each other."""
-        ours, theirs = _by_name(self.key_values), _by_name(key_values(self.file_curves))
+        both = (self.key_values, key_values(self.file_curves))
+        ours, theirs = (grouped(((one.quantity, one.key), one) for one in values) for values in both)
         return tuple(_summary(some, theirs.get(about, ())) for about, some in ours.items())
 
     @property
@@ -186,13 +187,6 @@ def spread(values: Iterable[float]) -> Spread | None:
     return Spread(float(known.mean()), float(known.std(ddof=1)) if known.size > 1 else float("nan"), known.size)
 
 
-def _by_name(values: Iterable[KeyValue]) -> dict[tuple[str, str], list[KeyValue]]:
-    found: dict[tuple[str, str], list[KeyValue]] = {}
-    for one in values:
-        found.setdefault((one.quantity, one.key), []).append(one)
-    return found
-
-
 def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue]) -> KeySummary:
     """Return one key value of both sides."""
     sides = {side: np.array([one.value for one in some if one.side == side]) for side in SIDES}
@@ -220,7 +214,8 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     values = _counted(((*trial.strides, *trial.lifts) for trial in trials), kind, turned)
     theirs = _counted((trial.file_curves for trial in trials), kind, turned)
     shared = [one for trial in trials for one in trial.shared if one.kind == kind and one not in turned]
-    spikes = [one for same in _same(curves) for one in _spikes(same)]
+    of_one = grouped(((one.quantity, one.side), one) for one in curves)
+    spikes = [one for same in of_one.values() for one in _spikes(same)]
     left_out = (
         *(LeftOutCurve(one, "", LeftOutBecause.TURN) for one in turned),
         *(LeftOutCurve(one, "loads", LeftOutBecause.SHARED_PLATE) for one in shared),
@@ -240,14 +235,6 @@ def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
     curves = [one for trial in trials for one in trial.curves if one.quantity == "pelvis_rotation"]
     known = [(one.cycle, one.value[np.isfinite(one.value)]) for one in curves if one.cycle.kind == "gait"]
     return [cycle for cycle, way in known if way.size and abs((way[-1] - way[0] + 180) % 360 - 180) > _TURNS]
-
-
-def _same(curves: Iterable[CycleCurve]) -> Iterable[list[CycleCurve]]:
-    """Return the curves of one quantity and side together."""
-    found: dict[tuple[str, str], list[CycleCurve]] = {}
-    for one in curves:
-        found.setdefault((one.quantity, one.side), []).append(one)
-    return found.values()
 
 
 def _spikes(same: Sequence[CycleCurve]) -> list[CycleCurve]:

@@ -1,6 +1,6 @@
 """Arrays and names as all records use them: checked, copied, read-only."""
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import TYPE_CHECKING, Protocol, TypeGuard, TypeVar
 
 import numpy as np
@@ -24,6 +24,8 @@ class _HasName(Protocol):
 
 
 _Named = TypeVar("_Named", bound=_HasName)
+_Key = TypeVar("_Key", bound=Hashable)
+_Value = TypeVar("_Value")
 
 
 def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> Array:
@@ -125,6 +127,14 @@ def in_time(time: Array, values: Array, columns: Iterable[str]) -> "pd.DataFrame
     import pandas as pd
 
     return pd.DataFrame(values, index=pd.Index(time, name="time (s)"), columns=list(columns))
+
+
+def grouped(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
+    """Return the values of ``pairs`` of a key and a value by their key, keys and values in the order they come in."""
+    found: dict[_Key, list[_Value]] = {}
+    for key, value in pairs:
+        found.setdefault(key, []).append(value)
+    return found
 
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from biodance.records.arrays import Mask
+from biodance.records.arrays import Mask, grouped
 
 
 class LeftOut(StrEnum):
@@ -146,11 +146,13 @@ def told_together(found: Iterable[Attention]) -> tuple[Attention, ...]:
     """Return the sentences with those of one check and limit, or of one wording, put into one that names its trials,
     each in its order: five lines that differ in a number say less than one.
     """
-    alike: dict[tuple[str, str, str], list[Attention]] = {}
-    for one in found:
-        said = one.text.partition(LIMIT_TOLD)[2] or _NUMBER.sub("#", one.text)
-        alike.setdefault((one.level, one.about, said) if one.trial else ("", "", one.text), []).append(one)
-    return tuple(_together(rows) for rows in alike.values())
+    return tuple(_together(rows) for rows in grouped((_wording(one), one) for one in found).values())
+
+
+def _wording(one: Attention) -> tuple[str, str, str]:
+    """Return what sentences that are told together have in common."""
+    said = one.text.partition(LIMIT_TOLD)[2] or _NUMBER.sub("#", one.text)
+    return (one.level, one.about, said) if one.trial else ("", "", one.text)
 
 
 def _together(rows: list[Attention]) -> Attention:

@@ -24,10 +24,10 @@ from biodance.records import Array
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.style import SIDE_COLOURS
-from biodance.report.files import write_files
+from biodance.report.files import write_results
 from biodance.report.pages.language import ENGLISH, N_, posture_said, read_language
 from biodance.report.pages.template import render
-from biodance.report.tables.schema import Row, Schema, markdown_table, plain_values, shown, to_text
+from biodance.report.tables.schema import Row, Schema, markdown_table, plain_values, shown
 from biodance.report.terminal import print_line, print_table
 
 _Eyes = tuple[tuple[str, tuple[float, float]], ...]
@@ -217,8 +217,7 @@ def write_dance(
         stills = [posture_still(dance.body, q, title) for q, title in zip(postures, titles, strict=True)]
         if picture := sheet_png(stills):
             (folder / "postures_3d.png").write_bytes(picture)
-    write_files(folder, {**texts, "results.json": to_text(found)})
-    return found
+    return write_results(folder, found, texts)
 
 
 _MARGINS = """# What is left of every limit

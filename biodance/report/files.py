@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.plain_text import for_spreadsheet, write_whole
 from biodance.lab.session.results_folder import made_folder
+from biodance.report.tables.schema import Row, plain_values, to_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,6 +41,13 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
     """Write every file whole, over an earlier one."""
     for name, text in files.items():
         write_whole(folder / name, text.encode(), over=True)
+
+
+def write_results(folder: Path, document: Row, files: Mapping[str, str]) -> Row:
+    """Write a ``document`` as results.json and ``files`` beside it; return it as programs read it."""
+    told: Row = plain_values(document)
+    write_files(folder, {"results.json": to_text(told), **files})
+    return told
 
 
 ENDINGS = (".csv", ".parquet")
@@ -75,6 +83,11 @@ def for_spreadsheets(frame: "DataFrame") -> "DataFrame":
 
     texts = {name: frame[name].map(for_spreadsheet) for name in frame.columns if not is_numeric_dtype(frame[name])}
     return frame.assign(**texts).rename(columns=for_spreadsheet)
+
+
+def csv_text(frame: "DataFrame") -> str:
+    """Return a table as the text of a CSV file for spreadsheets."""
+    return for_spreadsheets(frame).to_csv(index=False, lineterminator="\n")
 
 
 def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:

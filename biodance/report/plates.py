@@ -20,9 +20,9 @@ from biodance.display import BLACK, BLUE, GREY, RED, spaced
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.saved_results import now
 from biodance.report.figures.style import figure, look, svg_address
-from biodance.report.files import for_spreadsheets, write_files
+from biodance.report.files import csv_text, write_results
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.schema import Row, Schema, plain_values, to_text
+from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_line, print_table
 from biodance.report.wording import moment
 from biodance.version import __version__
@@ -223,7 +223,6 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         "plates.html.j2",
         style=Markup(template_text("page.css") + print_sheet(title, {}, f"biodance {__version__}, {moment(made)}")),
         name=document["archive"],
-        version=__version__,
         created=made,
         answer=f"{count} finding{'s' if count != 1 else ''}" if count else "nothing wrong to be seen",
         judged=judged,
@@ -245,12 +244,10 @@ def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
     """Write ``report.html``, ``results.json``, ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
     document = plates_document(found)
     texts = {
-        "results.json": to_text(document),
         "report.html": plates_page(found, document),
-        "plates.csv": for_spreadsheets(found.table()).to_csv(index=False, lineterminator="\n"),
+        "plates.csv": csv_text(found.table()),
     }
-    write_files(folder, texts)
-    return dict(plain_values(document))
+    return write_results(folder, document, texts)
 
 
 def print_plates(document: Row, console: Console) -> None:

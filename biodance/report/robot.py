@@ -8,12 +8,12 @@ from biodance.body.body import body_text
 from biodance.display import spaced
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.saved_results import BODY_FILE, now
-from biodance.report.files import write_files
+from biodance.report.files import write_results
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import render, template_text
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW
 from biodance.report.tables.identification import AGREEMENT_ROW, identification_document
-from biodance.report.tables.schema import Row, Schema, plain_values, to_text
+from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_attention, print_line
 from biodance.report.wording import format_number
 from biodance.report.write import PAGE
@@ -64,14 +64,13 @@ def robot_document(result: RobotResult) -> Row:
 def write_robot(result: RobotResult, folder: Path) -> Row:
     """Write ``report.html``, ``results.json`` and, where a body was found, ``body.json``; return the numbers."""
     numbers = robot_document(result)
-    content = {"results.json": to_text(numbers), PAGE: _page(result, numbers)}
+    content = {PAGE: _page(result, numbers)}
     done = result.identified.identification
     if done.status == "solved":
         content[BODY_FILE] = body_text(
             done.identified, f"Recording {result.recording.folder.name} of {result.body.name}."
         )
-    write_files(folder, content)
-    return dict(plain_values(numbers))
+    return write_results(folder, numbers, content)
 
 
 def _page(result: RobotResult, numbers: Row) -> str:
@@ -87,7 +86,6 @@ def _page(result: RobotResult, numbers: Row) -> str:
             row | {"feet": ", ".join(f"{one['foot']} {one['end_s']:.1f}" for one in row["standing"])}
             for row in numbers["matched"]
         ],
-        version=__version__,
         section=Markup(identification_section(result.identified)),
     )
 

@@ -15,6 +15,7 @@ from biodance.display import cause_in_words
 from biodance.doctor import MachineFinding
 from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
+from biodance.records import grouped
 from biodance.records.attention import Attention, told_together, without_path
 from biodance.report.tables.diagnosis import FIRST, seen_causes
 from biodance.report.tables.identification import SEGMENT_ROW, log_in_words
@@ -236,10 +237,7 @@ def _print_judged(rows: Sequence[Row], console: Console) -> None:
     """Print what was judged, and of what was not why: one line for all trials of one reason."""
     seconds = ", ".join(shown("{trial} {seconds:1} s", row) for row in rows if row["seconds"])
     print_line(console, f"judged: {seconds or 'nothing'}")
-    why: dict[str, list[str]] = {}
-    for row in rows:
-        if row["why_not"]:
-            why.setdefault(without_path(row["why_not"], row["trial"]), []).append(row["trial"])
+    why = grouped((without_path(row["why_not"], row["trial"]), row["trial"]) for row in rows if row["why_not"])
     for reason, trials in why.items():
         print_line(console, f"  {', '.join(trials)}: {reason}")
 

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.saved_results import now, provenance
 from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
+from biodance.report.figures import vector as svg
 from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
-from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
-from biodance.report.files import for_spreadsheets, write_files
+from biodance.report.files import csv_text, write_results
 from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.schema import Row, Schema, plain_values, table_of, to_text
+from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.report.terminal import print_line, print_table
 from biodance.report.wording import changed, millimetres, moment, sized_together
@@ -144,28 +143,25 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     standard deviation between its cycles, and how many they are; "" where no quantity is known in two visits.
     """
     # the last visit is drawn full in the side's colour, the others grey and dashed
-    looks = [Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
-    looks, cells = [*looks, Stroke(_COLOURS[side], "", 1.6)], []
+    looks = [svg.Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
+    looks, cells = [*looks, svg.Stroke(_COLOURS[side], "", 1.6)], []
     by_visit = [{(one.kind, one.quantity, one.side): one for one in groups} for groups in found.curves()]
     for quantity in quantities:
         some = [groups.get((kind, quantity, side)) for groups in by_visit]
         known = [one for one in some if one is not None and np.isfinite(one.mean).any()]
         if len(known) > 1:
             curves = [
-                Curve(visit.name, one.mean, look, one.sd if np.isfinite(one.sd).any() else None)
+                svg.Curve(visit.name, one.mean, look, one.sd if np.isfinite(one.sd).any() else None)
                 for visit, one, look in zip(found.visits, some, looks, strict=True)
                 if one is not None and np.isfinite(one.mean).any()
             ]
-            title = f"{curve_title(known[0])}, n = {_counts(some)}"
-            cells.append([Strip(title, curves, least=LEAST_SPANS.get(known[0].unit, 0.0))])
+            counts = ", ".join("0" if one is None else str(len(one.values)) for one in some)
+            title = f"{curve_title(known[0])}, n = {counts}"
+            cells.append([svg.Strip(title, curves, least=LEAST_SPANS.get(known[0].unit, 0.0))])
     if not cells:
         return ""
     about = f"{CYCLE_KINDS[kind]}, {side} side, all visits on one plot"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
-
-
-def _counts(some: Sequence[CurveGroup | None]) -> str:
-    return ", ".join("0" if one is None else str(len(one.values)) for one in some)
+    return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
 
 
 def _figures(found: VisitComparison) -> list[tuple[str, str, str]]:
@@ -206,7 +202,6 @@ def visits_page(found: VisitComparison, document: Row) -> str:
         scripts=[template_text("curves.js")],
         sheet=Markup(sheet),
         title=title,
-        version=__version__,
         document=document,
         schema=QUANTITY_ROW,
         placed=placement_words(),
@@ -223,12 +218,10 @@ def write_visits(found: VisitComparison, folder: Path) -> Row:
     """
     document = visits_document(found)
     texts = {
-        "results.json": to_text(document),
         COMPARE_PAGE: visits_page(found, document),
-        "quantities.csv": for_spreadsheets(quantities_frame(found)).to_csv(index=False, lineterminator="\n"),
+        "quantities.csv": csv_text(quantities_frame(found)),
     }
-    write_files(folder, texts)
-    return dict(plain_values(document))
+    return write_results(folder, document, texts)
 
 
 def print_compared(found: VisitComparison, document: Row, console: Console) -> None:

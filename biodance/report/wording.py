@@ -7,6 +7,7 @@ from typing import Any
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.display import SHOWN_UNITS, cause_in_words, spaced
 from biodance.identification.knowledge import SIGMAS
+from biodance.records import grouped
 from biodance.records.attention import Attention, told_together
 
 _ABSURD = 30.0  # Typical sizes above which a size from which something is seen means never
@@ -89,11 +90,8 @@ def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
     """Return causes (effect, target) by effect, the first targets of each by name: ``marker misplaced (C7, CLAV and 3
     more)``.
     """
-    targets: dict[str, list[str]] = {}
-    for effect, target in causes:
-        targets.setdefault(spaced(effect), []).append(cause_in_words("", target))
     out = []
-    for effect, of in targets.items():
+    for effect, of in grouped((spaced(effect), cause_in_words("", target)) for effect, target in causes).items():
         more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
         out.append(effect + (f" ({', '.join(of[:_NAMED])}{more})" if of[0] else ""))
     return "; ".join(out)

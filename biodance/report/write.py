@@ -1,6 +1,6 @@
 """Write what was found into a folder: the page for the analyst and the numbers for programs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,13 @@ from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
-from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.load import as_diagnosed
+from biodance.pipeline.movement import SessionMovement, describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
 from biodance.pipeline.session_frames import frames_of
 from biodance.records.attention import Attention
-from biodance.report.files import write_files
+from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.language import ENGLISH
@@ -30,8 +31,9 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
+from biodance.report.tables.frames import write_session_tables
 from biodance.report.tables.identification import corrected_document, identification_document
-from biodance.report.tables.schema import plain_values, to_text
+from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import (
     PROVENANCE_ROW,
     filter_document,
@@ -40,7 +42,31 @@ from biodance.report.tables.session import (
     results_document,
 )
 
-PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
+PAGE, SUBJECT_PAGE = "report.html", "subject.html"
+
+
+def write_session(
+    result: SessionResult,
+    found: SessionDiagnosis | None,
+    folder: Path,
+    *,
+    tables: Path | None = None,
+    lab: Path | None = None,
+    for_subject: str | None = None,
+    drawn: bool = True,
+    tell: Callable[[str], None],
+) -> tuple[SessionResult, dict[str, Any]]:
+    """Write what was found in a session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for
+    the person who was measured in that language; return the result and the content of results.json.
+    """
+    diagnosis = found.diagnosis if found else None
+    result = as_diagnosed(result, diagnosis) if diagnosis else result
+    moved = describe_movement(result, lab=lab, tell=tell)
+    tell("writing the page" if drawn else "writing")
+    write_session_tables(tables, result, diagnosis, movement=moved)
+    if for_subject:
+        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
+    return result, write_report(result, folder, diagnosis=found, movement=moved, drawn=drawn)
 
 
 def write_report(
@@ -66,11 +92,10 @@ def write_report(
         "gait": gait_document(movement),
     }
     found: dict[str, Any] = plain_values(numbers)
-    files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
+    files = {METHODS: methods_text(found)}
     if drawn:
         files |= {PAGE: _page(result, made, first, diagnosis, movement)} | _kept(result, folder)
-    write_files(folder, files)
-    return found
+    return write_results(folder, found, files)
 
 
 def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
@@ -125,9 +150,7 @@ def write_identification(
     }
     told: dict[str, Any] = plain_values(numbers)
     page = _page(result, made, first, movement=movement)
-    files = {_NUMBERS: to_text(told), METHODS: methods_text(told), PAGE: page}
-    write_files(folder, files | _kept(result, folder))
-    return told
+    return write_results(folder, told, {METHODS: methods_text(told), PAGE: page} | _kept(result, folder))
 
 
 def write_diagnosis(
@@ -159,8 +182,7 @@ def write_diagnosis(
     if accepted:
         numbers["accepted"], more = _accepted(result, found, folder, earlier)
         files |= more
-    write_files(folder, {_NUMBERS: to_text(numbers), **files})
-    return dict(plain_values(numbers))
+    return write_results(folder, numbers, files)
 
 
 def _accepted(

@@ -13,16 +13,8 @@ from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.movement.protocol import STAND
+from biodance.virtual_lab.person import skeleton
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.person.skeleton import (
-    ARM_AND_LEG,
-    TRUE_SEGMENTS,
-    LabTolerances,
-    small_rotation,
-    smooth_noise,
-    stream,
-    virtual_people,
-)
 
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
@@ -55,7 +47,9 @@ class SoftTissue:
     wave: Array
 
 
-def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, tissue: str = "pulled") -> SoftTissue:
+def draw_soft_tissue(
+    person: Person, session: int, tolerances: skeleton.LabTolerances, tissue: str = "pulled"
+) -> SoftTissue:
     """Draw the coefficients of a kind of ``tissue`` (`TISSUES`): most belong to the person, a share of their variance
     to the day (clothes, tape, place on the skin).
     """
@@ -64,16 +58,19 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     scale = np.zeros((len(joints), len(markers.names)))
     swing = np.zeros(len(markers.names))
     for k, (name, segment) in enumerate(zip(markers.names, markers.segment, strict=True)):
-        kind = next((k for k in ARM_AND_LEG if TRUE_SEGMENTS[segment].endswith(k)), TRUE_SEGMENTS[segment])
+        kind = next(
+            (k for k in skeleton.ARM_AND_LEG if skeleton.TRUE_SEGMENTS[segment].endswith(k)),
+            skeleton.TRUE_SEGMENTS[segment],
+        )
         side = "right" if name.startswith("R") else "left"
-        pulls = dict(virtual_people()["pull_mm_rad"][kind])
+        pulls = dict(skeleton.virtual_people()["pull_mm_rad"][kind])
         if name.endswith(("SHO", "BAK")):
             pulls |= SHOULDER_PULL
         for joint, millimetres in pulls.items():
             full = joint if joint in joints else f"{side}_{joint}"
             scale[joints.index(full), k] = 0.001 * millimetres / np.sqrt(3.0)
         swing[k] = 2 * np.pi * SWING.get(name[1:], BONY)
-    own, day = stream(person.seed, "soft tissue"), stream(person.seed, "soft tissue", str(session))
+    own, day = skeleton.stream(person.seed, "soft tissue"), skeleton.stream(person.seed, "soft tissue", str(session))
     share = tolerances.soft_tissue_day
     shape = (*scale.shape, 3)
     direction = np.sqrt(1 - share) * own.normal(size=shape) + np.sqrt(share) * day.normal(size=shape)
@@ -81,7 +78,7 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
         0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size))
     )
     pulled, swinging, waving = TISSUES[tissue]
-    waves = stream(person.seed, "waves", str(session))
+    waves = skeleton.stream(person.seed, "waves", str(session))
     wave = np.stack(
         [
             waving * tolerances.soft_tissue * _BENT * scale.max(axis=0)[:, None] * waves.normal(size=(swing.size, 3)),
@@ -126,7 +123,7 @@ def skin_displacement(
     specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
     local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
     if np.any(tissue.sag):
-        drift = smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
+        drift = skeleton.smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
         local += DRIFT * drift.reshape(time.size, len(markers.names), 3)
     return np.einsum("tkij,tkj->tki", turn, local)
 
@@ -153,7 +150,7 @@ def film(
     tissue: SoftTissue,
     time: Array,
     tilt: Array,
-    tolerances: LabTolerances,
+    tolerances: skeleton.LabTolerances,
     rng: np.random.Generator,
 ) -> Markers:
     """Return what the cameras deliver at ``time`` (T,) s, lab frame; ``tilt`` (3, 3) turns true-vertical axes into the
@@ -162,7 +159,7 @@ def film(
     Gaps come in every trial except the static one, which every laboratory repeats until it is complete.
     """
     xyz = true_markers(performance, tissue, time, rng) @ tilt.T
-    wander = smooth_noise(rng, time, columns=3 * xyz.shape[1], cutoff=0.6).reshape(xyz.shape)
+    wander = skeleton.smooth_noise(rng, time, columns=3 * xyz.shape[1], cutoff=0.6).reshape(xyz.shape)
     xyz = xyz + tolerances.camera_wander * wander + tolerances.camera_noise * rng.normal(size=xyz.shape)
     if performance.plan.role != "static":
         step = time[1] - time[0]
@@ -217,7 +214,7 @@ def lay_plate(
     centre: Array,
     heading: float,
     side: str,
-    tolerances: LabTolerances,
+    tolerances: skeleton.LabTolerances,
     rng: np.random.Generator,
     *,
     moment_zero: float = 0.0,
@@ -237,7 +234,7 @@ def lay_plate(
     corners = centre + (signs * half) @ turn[:, :2].T
     mixing = t.plate_crosstalk * rng.normal(size=(6, 6)) * np.outer(FULL_SCALE, 1 / FULL_SCALE)
     np.fill_diagonal(mixing, 1.0 + t.plate_gain * rng.normal(size=6))
-    true_turn = turn @ small_rotation(t.plate_rotation * rng.normal(size=3))
+    true_turn = turn @ skeleton.small_rotation(t.plate_rotation * rng.normal(size=3))
     place, zero = centre + t.plate_position * rng.normal(size=3), t.plate_offset * relative * rng.normal(size=6)
     if moment_zero:
         zero[3:] += moment_zero * rng.normal(size=3)
@@ -249,7 +246,7 @@ def sense_plate(
     plate: TruePlate,
     time: Array,
     tilt: Array,
-    tolerances: LabTolerances,
+    tolerances: skeleton.LabTolerances,
     rng: np.random.Generator,
 ) -> Array:
     """Return what the plate's six channels say (S, 6) N, N·m at ``time`` (S,) s: reaction on the subject, plate axes,

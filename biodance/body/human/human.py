@@ -53,7 +53,7 @@ from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.error_sizes import error_size
 from biodance.display import spaced
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
-from biodance.records import SIDES, Array, Sip, Subject
+from biodance.records import SIDES, Array, Sip, Subject, grouped
 from biodance.settings import STANDARD_GRAVITY, Settings
 
 _AXES = ("sagittal", "longitudinal", "transverse")
@@ -424,10 +424,8 @@ def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     """Return what of the person's shape says something about which masses."""
     if not told:
         return ()
-    by_source: dict[str, list[str]] = {}
-    for segment, names in told.items():
-        by_source.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
-    some = [f"{names} for {' and '.join(segments)}" for names, segments in by_source.items() if names]
+    sources = ((", ".join(name for name in names if name != "scan"), segment) for segment, names in told.items())
+    some = [f"{names} for {' and '.join(segments)}" for names, segments in grouped(sources).items() if names]
     scanned = ["the scan for all segments"] if "scan" in told.get("pelvis", ()) else []
     words = spaced("; ".join([*some, *scanned]))
     return (

@@ -5,17 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from biodance.body.human.measures import (
-    Measures,
-    chord,
-    davis_hip,
-    elbow,
-    harrington_hip,
-    pelvis_frame,
-    shoulder,
-    unit,
-    wrist,
-)
+from biodance.body.human import measures
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
@@ -85,7 +75,9 @@ def static_sd(joint: str) -> float:
     return error_size("hinge_centre", "hinge", state="before") if hinge else joint_size("joint_centre", joint)
 
 
-def static_centres(mark: _Places, sizes: Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True) -> Centres:
+def static_centres(
+    mark: _Places, sizes: measures.Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True
+) -> Centres:
     """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
 
     Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait.
@@ -120,39 +112,44 @@ def static_centres(mark: _Places, sizes: Measures, *, hip: Hip, trunk_fraction: 
     return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes), sole=sole)
 
 
-def _hip_centres(place: _Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+def _hip_centres(place: _Places, sizes: measures.Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
     """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
-    rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
+    rotation, middle = measures.pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
     legs = float(np.mean(list(sizes.leg_length.values())))
     centres = {}
     for side, sign in SIGN.items():
         local = (
-            harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
+            measures.harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
             if hip == "harrington"
-            else davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
+            else measures.davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
         )
         centres[side] = middle + rotation @ (local * [1.0, 1.0, sign])
     return rotation, centres
 
 
-def _shoulder_centres(place: _Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
+def _shoulder_centres(place: _Places, sizes: measures.Measures, mid_hip: Array) -> dict[str, Array]:
     """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion."""
     right, left = place["right_acromion"], place["left_acromion"]
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
         up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
         ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
-        forward = unit(np.cross(np.cross(up, ahead), up))
+        forward = measures.unit(np.cross(np.cross(up, ahead), up))
     else:
         up = (right + left) / 2 - mid_hip
-        forward = unit(np.cross(up, right - left))
+        forward = measures.unit(np.cross(up, right - left))
     offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
     if "jugular_notch" not in place:
-        return {side: place[f"{side}_acromion"] - offset[side] * unit(up) for side in SIGN}
+        return {side: place[f"{side}_acromion"] - offset[side] * measures.unit(up) for side in SIGN}
     base = place["jugular_notch"] - sizes.marker_radius * forward
-    return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
+    return {
+        side: measures.shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side])
+        for side in SIGN
+    }
 
 
-def knee_centre(place: _Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
+def knee_centre(
+    place: _Places, sizes: measures.Measures, hip: Array, pelvis_right: Array, side: str
+) -> tuple[Array, str]:
     """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh
     marker.
 
@@ -163,14 +160,14 @@ def knee_centre(place: _Places, sizes: Measures, hip: Array, pelvis_right: Array
     if f"{side}_knee_medial" in place:
         return (lateral + place[f"{side}_knee_medial"]) / 2, ""
     distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
-    foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
-    across = unit(pelvis_right + foot_right)
+    foot_right = measures.unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
+    across = measures.unit(pelvis_right + foot_right)
     if f"{side}_knee_axis" in place:
-        return chord(hip, lateral, distance, place[f"{side}_knee_axis"]), ""
-    usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
+        return measures.chord(hip, lateral, distance, place[f"{side}_knee_axis"]), ""
+    usual = measures.chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
     if f"{side}_thigh_wand" not in place:
         return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
-    centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
+    centre = measures.chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
     axis = SIGN[side] * (lateral - centre)
     angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
     if abs(angle) <= _AXIS_TOLERANCE:
@@ -183,16 +180,16 @@ def knee_centre(place: _Places, sizes: Measures, hip: Array, pelvis_right: Array
     )
 
 
-def _ankle_centre(place: _Places, sizes: Measures, knee: Array, side: str) -> Array:
+def _ankle_centre(place: _Places, sizes: measures.Measures, knee: Array, side: str) -> Array:
     """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis."""
     lateral = place[f"{side}_ankle_lateral"]
     if f"{side}_ankle_medial" in place:
         return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
     outside = place.get(f"{side}_shank_wand", lateral + place[f"{side}_knee_lateral"] - knee)
-    return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
+    return measures.chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
 
 
-def arm_centres(place: _Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+def arm_centres(place: _Places, sizes: measures.Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
     """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait
     construction.
 
@@ -204,11 +201,13 @@ def arm_centres(place: _Places, sizes: Measures, shoulder_at: Array, side: str) 
     middle = (radial + ulnar) / 2
     if f"{side}_elbow_medial" in place:
         return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
-    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
+    at = measures.elbow(
+        shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side]
+    )
     reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
     if np.linalg.norm(radial - ulnar) < 2 * reach + _WRIST_BAR:
         return at, middle
-    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
+    return at, measures.wrist(at, radial, ulnar, reach, side=SIGN[side])
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,8 +257,8 @@ def segment_frames(centres: Centres) -> SegmentFrames:
 
 def _frame_yz(up: Array, right: Array) -> Array:
     """Return (3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
-    y = unit(up)
-    x = unit(np.cross(y, right))
+    y = measures.unit(up)
+    x = measures.unit(np.cross(y, right))
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
@@ -273,6 +272,6 @@ def _chain(
     """Fill in the two segments of a limb: the second flexes about z of the first, tilted about its own x (varus)."""
     (upper, lower), (top, middle, end) = names, centres
     rotation[upper], origin[upper], origin[lower] = _frame_yz(top - middle, right), top, middle
-    direction = rotation[upper].T @ unit(middle - end)
+    direction = rotation[upper].T @ measures.unit(middle - end)
     flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
     rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)

@@ -31,7 +31,7 @@ from biodance.identification.base_parameters import structural_base
 from biodance.identification.posterior import prior_factor
 from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses
-from biodance.records import Array
+from biodance.records import Array, grouped
 from biodance.spatial import cross, skew
 
 
@@ -105,10 +105,7 @@ def total(
 ) -> tuple[float, Array]:
     """Return sum_i M_i cond(W_bi) over segments with weight and columns, and its gradient by grams (N, k, k)."""
     value, slope = 0.0, np.zeros_like(grams)
-    alike: dict[tuple[int, ...], list[int]] = {}
-    for i, columns in enumerate(pick):
-        if columns and weight[i] > 0:
-            alike.setdefault(tuple(columns), []).append(i)
+    alike = grouped((tuple(columns), i) for i, columns in enumerate(pick) if columns and weight[i] > 0)
     for picked, segments in alike.items():
         block = np.ix_(segments, picked, picked)
         cond, part = measure(grams[block])

@@ -16,18 +16,8 @@ from biodance.dance.problem.excitation import PostureInformation, static_grams, 
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words
+from biodance.dance.search import postures
 from biodance.dance.search.course import Course, DesignContext, PlainStep, with_exciting_moves
-from biodance.dance.search.postures import (
-    KEPT,
-    Exciting,
-    alike,
-    criterion,
-    find_postures,
-    initial_guess,
-    intermediate_posture,
-    posture_at,
-    solve,
-)
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -61,7 +51,9 @@ def _postures(work: DesignContext) -> Course[PlainStep]:
     kept = work.checkpoint.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        x = find_postures(chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers)
+        x = postures.find_postures(
+            chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers
+        )
         kept = {"x": x}
         work.checkpoint.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
@@ -83,7 +75,7 @@ def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> C
         before, after = [p for p in counted if p < k][-1], [p for p in counted if p > k][:1]
         near = np.array([rows[p] for p in (before, *after)])
         seed = [work.seed, 2, k]
-        rows[k] = intermediate_posture(work.chain, stances[k], near, work.plan.limits, seed=seed).x
+        rows[k] = postures.intermediate_posture(work.chain, stances[k], near, work.plan.limits, seed=seed).x
     steps = tuple(PlainStep(rows[k], stance) for k, stance in enumerate(stances))
     return Course(steps, (None,) * (len(steps) - 1))
 
@@ -200,7 +192,7 @@ def _other_step(work: DesignContext, course: Course[PlainStep], place: int, atte
     else:
         near = np.delete(course.x, place, axis=0)[max(0, place - 1) : place + 1]
         seed, mild = [work.seed, 5, attempt, place], _REST[attempt - 1]
-        x = intermediate_posture(work.chain, stance, near, limits, seed=seed, mild=mild).x
+        x = postures.intermediate_posture(work.chain, stance, near, limits, seed=seed, mild=mild).x
     return PlainStep(x, stance)
 
 
@@ -208,16 +200,18 @@ def _other_posture(work: DesignContext, course: Course[PlainStep], place: int, r
     """Return the most exciting posture (n,) beside all others from a few fresh starts, or the old one."""
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
     counted = [step for k, step in enumerate(course.steps) if step.stance.over is None and k != place]
-    others = [posture_at(chain, step.stance, step.x) for step in counted]
+    others = [postures.posture_at(chain, step.stance, step.x) for step in counted]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
-    objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), _SHARPNESS)
-    starts = [initial_guess(chain, stance, rng) for _ in range(_STARTS)]
+    objective = postures.Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), _SHARPNESS)
+    starts = [postures.initial_guess(chain, stance, rng) for _ in range(_STARTS)]
     given = objective, work.plan.limits
-    tasks = [work.workers.submit(solve, chain, stance, one, *given, iterations=_ITERATIONS) for one in starts]
+    tasks = [work.workers.submit(postures.solve, chain, stance, one, *given, iterations=_ITERATIONS) for one in starts]
     found = [task.result() for task in tasks]
     same = [step.x for k, step in enumerate(course.steps) if step.stance.name == stance.name and k != place]
-    kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]
-    return min(kept, key=lambda p: criterion(blocks, [*others, p])).x if kept else course.steps[place].x
+    kept = [
+        p for p in found if p.violation <= postures.KEPT and not postures.alike(np.array([p.x, *same]))[0, 1:].any()
+    ]
+    return min(kept, key=lambda p: postures.criterion(blocks, [*others, p])).x if kept else course.steps[place].x
 
 
 def _spare(course: Course[PlainStep], k: int, first: Course[PlainStep]) -> set[int]:

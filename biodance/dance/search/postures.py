@@ -43,7 +43,7 @@ from biodance.dance.problem.nlp import (
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError
-from biodance.records import Array
+from biodance.records import Array, grouped
 
 
 @dataclass(frozen=True, eq=False)
@@ -456,9 +456,7 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
     first, exchanged for better ones of the same stance as long as any helps.
     """
     worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
-    of_feet: dict[str, list[list[Posture]]] = {}
-    for stance, found in zip(stances, pool, strict=True):
-        of_feet.setdefault(stance.name, []).append(found)
+    of_feet = grouped(zip((stance.name for stance in stances), pool, strict=True))
     feet = {name: _SameFeet.first_of(found, worth) for name, found in of_feet.items()}
     whole = sum(one.grams[one.taken].sum(axis=0) for one in feet.values())
     effort = sum(one.hard[one.taken].sum() for one in feet.values())

@@ -19,6 +19,7 @@ from biodance.child_process import run_python
 from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, texts
 from biodance.lab.c3d.parameters import MIPS, RESAVE, Parameters, doubles, floats, read_header, read_parameters
+from biodance.lab.markers.upright import METRES, PERSON_SPAN, extents, likely_unit
 from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array, any_coordinate, spread_frames
 
@@ -124,7 +125,7 @@ def _same(one: Array, other: Array) -> bool:
     return np.allclose(one, other, rtol=1e-5, atol=1e-6 * size, equal_nan=True)
 
 
-_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
+_METRES = {**METRES, "dm": 1e-1, "in": 0.0254}
 _PREFIXES = {"mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
 _SPELLINGS = {
     **{
@@ -135,12 +136,6 @@ _SPELLINGS = {
     **{unit: unit for unit in _METRES},
     **dict.fromkeys(("inch", "inches"), "in"),
 }
-_GUESSES = ("mm", "cm", "m")
-_PERSON = 1.5
-"""m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or
-raised.
-"""
-
 _PLATE = 0.6  # m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
 
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
@@ -175,32 +170,24 @@ def metres_per_unit(
             f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
             "m). Write the unit into the file and read it again."
         )
-    guess = min(_GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
+    guess = likely_unit(size, expected)
     said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."
     return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
 
 
-def _extents(points: Array) -> Array:
-    """Return the largest side of the box about the markers (T, K, 3) in frames that show four of them."""
-    frames = points[(~any_coordinate(~np.isfinite(points))).sum(axis=1) >= 4]
-    if not len(frames):
-        return np.empty(0)
-    return np.asarray((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1))
-
-
 def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
-    extents = _extents(spread_frames(points))
-    if extents.size:
-        extent = float(np.median(extents))
+    sides = extents(spread_frames(points), 4)
+    if len(sides):
+        extent = float(np.median(sides.max(axis=1)))
         if 0 < extent < math.inf:
-            return extent, _PERSON, "a cloud of markers"
+            return extent, PERSON_SPAN, "a cloud of markers"
     corners = parameter_numbers(parameters, *_CORNERS)
     if corners.size >= 12 and np.isfinite(corners).all():
         longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
         if 0 < longest < math.inf:
             return longest, _PLATE, "a plate side"
-    return math.nan, _PERSON, ""
+    return math.nan, PERSON_SPAN, ""
 
 
 _FRAMES = 4096  # Frames looked at at once: little memory, however long the recording

@@ -15,7 +15,7 @@ from biodance.lab.c3d.emg import EmgEnvelope, emg_envelopes, muscle_of
 from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label
-from biodance.records import Array, FootEvent
+from biodance.records import Array, FootEvent, grouped
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
 _WORDS = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
@@ -180,9 +180,7 @@ def _without_repeats(
     raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]
 ) -> tuple[list[int], list[str]]:
     """Return columns and names: an unseen or equal repetition goes, a different one is numbered like the first."""
-    places: dict[str, list[int]] = {}
-    for column in columns:
-        places.setdefault(raw.split_labels[column][1], []).append(column)
+    places = grouped((raw.split_labels[column][1], column) for column in columns)
     kept: dict[int, str] = {}
     for name, same in places.items():
         if len(same) == 1:

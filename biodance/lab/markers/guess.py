@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from biodance.lab.markers import upright
 from biodance.lab.markers.names import (
     Meaning,
     joints_from_video,
@@ -30,17 +31,6 @@ from biodance.lab.markers.sets import (
     part_of,
     segment_of,
 )
-from biodance.lab.markers.upright import (
-    OUTWARDS,
-    Standing,
-    bound,
-    median_places,
-    mirror_images,
-    posture_frames,
-    standing_by_names,
-    standing_by_points,
-    usual_standing,
-)
 from biodance.records import SIDES, Array, Markers, Mask
 
 _TOES = ("toe", "toe_lateral", "toe_medial")
@@ -58,7 +48,7 @@ _Said = Mapping[str, tuple[Meaning, ...]]
 
 
 def _nats(name: str) -> float:
-    return float(usual_standing()["nats"][name])
+    return float(upright.usual_standing()["nats"][name])
 
 
 def _spelled(rank: int) -> float:
@@ -66,7 +56,7 @@ def _spelled(rank: int) -> float:
     return float(np.log1p(rank / _nats("rank")))
 
 
-def _by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
+def _by_names(said: _Said, stand: upright.Standing | None = None) -> dict[str, str]:
     """Return landmark -> label by the names, and by the heights of a person whose places are not known yet."""
     cost = np.full((len(said), len(LANDMARKS)), np.inf)
     for i, (label, ways) in enumerate(said.items()):
@@ -77,7 +67,7 @@ def _by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
     return {LANDMARKS[j]: list(said)[i] for i, j in _cheapest(cost)[0]}
 
 
-def _high(stand: Standing, place: str, label: str) -> float:
+def _high(stand: upright.Standing, place: str, label: str) -> float:
     """Return the cost of a height, nats: 2 at the limit where it is believed, none within half of it."""
     return 2 * max(stand.misfit(place, label) - 0.5, 0.0)
 
@@ -96,7 +86,7 @@ def _cheapest(cost: Array) -> tuple[list[tuple[int, int]], float]:
 @cache
 def _template() -> tuple[tuple[str, ...], Array, Array]:
     """Return the landmarks with a usual place, it (P, 3), and covariances (3, P, P): shares of the stature."""
-    usual = usual_standing()
+    usual = upright.usual_standing()
     parts = {part: ("",) if part in ("mid_psis", "c7") else SIDES for part in usual["places"]}
     places = tuple(f"{side}_{part}" if side else part for part, sides in parts.items() for side in sides)
     part, side = [part_of(place) for place in places], [place.startswith("left") for place in places]
@@ -114,14 +104,14 @@ def _template() -> tuple[tuple[str, ...], Array, Array]:
 def _squares(shares: Array, known: Mapping[str, int]) -> Array:
     """Return (N, P) squared distances, in sd, of markers (N, 3) from landmarks, given the ``known`` ones' rows."""
     places, at, covariance = _template()
-    sides = np.array([OUTWARDS.get(place.partition("_")[0], 1.0) for place in places])
+    sides = np.array([upright.OUTWARDS.get(place.partition("_")[0], 1.0) for place in places])
     have = [k for k, place in enumerate(places) if place in known]
     total = np.zeros((len(shares), len(places)))
     for axis, cov in enumerate(covariance):
         x = shares[:, axis, None] * (sides if axis == 0 else np.ones(len(places)))
         mean, variance = at[:, axis].copy(), np.diag(cov).copy()
         if have:
-            inverse = np.linalg.inv(cov[np.ix_(have, have)] + bound("glued") ** 2 * np.eye(len(have)))
+            inverse = np.linalg.inv(cov[np.ix_(have, have)] + upright.bound("glued") ** 2 * np.eye(len(have)))
             off = x[[known[places[k]] for k in have], have] - mean[have]
             off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
             # what all others tell of a known one: x_i - mu_i(others) = (C^-1 off)_i / (C^-1)_ii
@@ -130,7 +120,7 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
             mean += cov[:, have] @ inverse @ off
             variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
             mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)
-        total += (x - mean) ** 2 / np.maximum(variance, bound("glued") ** 2)
+        total += (x - mean) ** 2 / np.maximum(variance, upright.bound("glued") ** 2)
     return total
 
 
@@ -142,7 +132,7 @@ class _PersonLabels:
     it; ``free`` (N, P): where it may be one that they do not name.
     """
 
-    def __init__(self, stand: Standing, said: _Said) -> None:
+    def __init__(self, stand: upright.Standing, said: _Said) -> None:
         self.rows = {label: i for i, label in enumerate(plain_labels(stand.at))}
         self.said = {label: said.get(label, ()) for label in self.rows}
         self.named = _by_names(self.said, stand)
@@ -154,7 +144,7 @@ class _PersonLabels:
         self._shares = stand.shares(self.rows)
         told = sides_of(stand.at)
         agree = [told[label] == SIDES[int(self._shares[i, 0] < 0)] for label, i in self.rows.items() if label in told]
-        self._sides = told if agree and np.mean(agree) > bound("believed") else {}
+        self._sides = told if agree and np.mean(agree) > upright.bound("believed") else {}
         self.words = np.full((len(self.rows), len(LANDMARKS)), np.inf)
         self.free = np.zeros(self.words.shape, dtype=bool)
         for label, i in self.rows.items():
@@ -185,7 +175,10 @@ class _PersonLabels:
     def _open_to(self, label: str) -> Iterator[str]:
         """Yield what a label may mark that does not name it: it says nothing, or no more than the segment."""
         ways, own = self.confirmed[label], self._sides.get(label)
-        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < bound("same")
+        have, middle = (
+            {part_of(one) for one in self._sure},
+            abs(self._shares[self.rows[label], 0]) < upright.bound("same"),
+        )
         for place in _FREE:
             side, part = place.partition("_")[0], part_of(place)
             named = {"mid_psis"} if part == "psis" else {"mid_psis", "psis"} if part == "mid_psis" else set()
@@ -198,16 +191,16 @@ class _PersonLabels:
 
     def _by_height_and_width(self) -> Array:
         """Return the cost (N, P), nats, of heights where there is no usual place, and of ends of elbows and toes."""
-        cost, labels, usual = np.zeros(self.words.shape), list(self.rows), usual_standing()["places"]
+        cost, labels, usual = np.zeros(self.words.shape), list(self.rows), upright.usual_standing()["places"]
         for i, j in np.argwhere(np.isfinite(self.words)):
             if part_of(LANDMARKS[j]) not in usual:
                 cost[i, j] = _high(self._stand, LANDMARKS[j], labels[i])
         for side, joint in product(SIDES, ("elbow", "toe")):
             lateral, medial = (_AT[f"{side}_{joint}_{end}"] for end in _ENDS)
             either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
-            out = OUTWARDS[side] * self._shares[:, 0]
+            out = upright.OUTWARDS[side] * self._shares[:, 0]
             middle = out[either].mean() if either.any() else 0.0
-            outside = _nats("outer") * np.clip((out - middle) / bound("same"), -1.0, 1.0)
+            outside = _nats("outer") * np.clip((out - middle) / upright.bound("same"), -1.0, 1.0)
             cost[:, [lateral, medial]] += np.stack([-outside, outside], axis=1)
         return cost
 
@@ -229,7 +222,7 @@ class _PersonLabels:
             away = self._distances(new)
             for place, label in tuple(new.items()):
                 i, j = self.rows[label], _AT[place]
-                if free[i, j] and part_of(place) not in _TOES and away[i, j] > bound("near") / 2:
+                if free[i, j] and part_of(place) not in _TOES and away[i, j] > upright.bound("near") / 2:
                     free[i, j] = False  # what was taken with it says that it is elsewhere
                     del new[place]
             if new == fixed:
@@ -246,8 +239,10 @@ class _PersonLabels:
         front = [_AT[f"{side}_{toe}"] for side in SIDES for toe in _TOES]
         away[:, front] = usual[:, front]  # it is not known which toe is there: the foot may turn
         away += np.array([[_nats("segment") * bool(ways)] for ways in self.confirmed.values()])
-        rivals = np.where(open_ & (away < bound("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf)
-        for i, j in np.argwhere(open_ & (away < bound("near") / 2)):
+        rivals = np.where(
+            open_ & (away < upright.bound("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf
+        )
+        for i, j in np.argwhere(open_ & (away < upright.bound("near") / 2)):
             if self._stand.believed(LANDMARKS[j], labels[i]):
                 cost[i, j] = rivals[i, j]
         for place, label in fixed.items():
@@ -262,7 +257,7 @@ class _PersonLabels:
 
     def _next_best(self, row: int, column: int, cost: Array, rivals: Array) -> float:
         """Return the sum of the next best assignment, in which no marker at this place is the landmark."""
-        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= bound("same")
+        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= upright.bound("same")
         other = cost.copy()
         other[:, column] = np.where(beside, np.inf, np.minimum(cost[:, column], rivals[:, column]))
         return _cheapest(other)[1]
@@ -280,9 +275,9 @@ class _PersonLabels:
         """Return (N, P) whether a label may be a heel or toe: the hindmost and foremost of a foot, or its ball."""
         ends, balls = dict[str, int](), dict[str, int]()
         mute = np.array([not ways for ways in self.confirmed.values()])
-        here = free & (away < bound("near") / 2) & np.array([[label not in taken] for label in self.rows])
+        here = free & (away < upright.bound("near") / 2) & np.array([[label not in taken] for label in self.rows])
         for side in SIDES:
-            out, ahead = OUTWARDS[side] * self._shares[:, 0], self._shares[:, 1]
+            out, ahead = upright.OUTWARDS[side] * self._shares[:, 0], self._shares[:, 1]
             hind, front = (np.flatnonzero(here[:, _AT[f"{side}_{end}"]]) for end in ("heel", "toe"))
             front = front[mute[front]] if mute[front].any() else front
             if hind.size:
@@ -291,7 +286,7 @@ class _PersonLabels:
                 ends[f"{side}_toe"] = front[ahead[front].argmax()]
                 outer, inner = front[out[front].argmax()], front[out[front].argmin()]
                 across, along = np.abs(self._shares[outer] - self._shares[inner])[:2]
-                if along < across and np.hypot(across, along) > bound("ball"):
+                if along < across and np.hypot(across, along) > upright.bound("ball"):
                     balls |= {f"{side}_toe_lateral": outer, f"{side}_toe_medial": inner}
         if len(balls) == 2 * len(SIDES):
             ends = balls | {place: row for place, row in ends.items() if part_of(place) == "heel"}
@@ -324,7 +319,7 @@ def guess_set(markers: Markers) -> _GuessedSet:
 
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
-    at = median_places(markers, posture_frames(markers)[0])
+    at = upright.median_places(markers, upright.posture_frames(markers)[0])
     found = _guessed(at)
     joints = () if found.name else joints_from_video(at)
     return replace(found, doubts=(_FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
@@ -333,20 +328,20 @@ def guess_set(markers: Markers) -> _GuessedSet:
 def _guessed(at: Mapping[str, Array]) -> _GuessedSet:
     """Return the guess for the person whom the names show, else for the one whom the points show."""
     said = meanings_of(at)
-    stand = standing_by_names(at, _by_names(said))
-    if isinstance(stand, Standing):
-        stand = standing_by_names(at, _by_names(said, stand))
-    if isinstance(stand, Standing):
+    stand = upright.standing_by_names(at, _by_names(said))
+    if isinstance(stand, upright.Standing):
+        stand = upright.standing_by_names(at, _by_names(said, stand))
+    if isinstance(stand, upright.Standing):
         named = _guess_of(_PersonLabels(stand, said))
     else:
         named = _GuessedSet(
             {}, (stand or "Too few labels say which landmark they mark, so no marker set can be guessed.",)
         )
     plain = plain_labels(at)
-    person = None if named.name else standing_by_points({label: at[label] for label in plain})
+    person = None if named.name else upright.standing_by_points({label: at[label] for label in plain})
     if person is None:
         return named
-    words = side_words((plain[right], plain[left]) for right, left in mirror_images(person))
+    words = side_words((plain[right], plain[left]) for right, left in upright.mirror_images(person))
     if sides_exchanged(words):
         return named
     stood = _guess_of(_PersonLabels(replace(person, at=at), meanings_of(at, sides=words)))
@@ -370,10 +365,10 @@ def _guess_of(person: _PersonLabels) -> _GuessedSet:
     if "mid_psis" not in places and not {"left_psis", "right_psis"} <= places.keys():
         absent.append("the posterior iliac spines or the sacrum")
     reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
-    usual = [label for label in person.named.values() if person.said[label][0].rank < bound("usual")]
+    usual = [label for label in person.named.values() if person.said[label][0].rank < upright.bound("usual")]
     other = {places.get(other_side(place)) for place, label in person.named.items() if not person.confirmed[label]}
     refuted = [label for label in usual if not person.confirmed[label] and label not in other]
-    if len(usual) - len(refuted) < bound("believed") * len(usual):
+    if len(usual) - len(refuted) < upright.bound("believed") * len(usual):
         reasons.append(
             f"Only {len(usual) - len(refuted)} of {len(usual)} landmarks that the labels name stand where a person has "
             f"them; elsewhere: {', '.join(refuted)}."

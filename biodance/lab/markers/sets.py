@@ -16,7 +16,7 @@ import numpy as np
 from biodance.discovery import DataFamily
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, known_index, refuse_unknown
 from biodance.library import read_toml
-from biodance.records import SIDES, Array, Markers, Trial
+from biodance.records import SIDES, Array, Markers, Trial, grouped
 
 MARKED_SEGMENTS = (
     "pelvis",
@@ -115,9 +115,7 @@ class MarkerSet:
         the file has one such label.
         """
         known = set(given := tuple(labels))
-        folded: dict[str, list[str]] = {}
-        for label in given:
-            folded.setdefault(label.casefold(), []).append(label)
+        folded = grouped((label.casefold(), label) for label in given)
         found = {}
         for label, spellings in self._spellings.items():
             alike = [spelling for spelling in spellings if spelling in known]

@@ -14,7 +14,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.names import meanings, meanings_of, plain_labels
 from biodance.lab.markers.sets import LANDMARKS, MarkerSet, landmark, part_of, segment_of
 from biodance.library import locate, read_toml
-from biodance.records import SIDES, Array, Markers, Mask, Trial, Wrench, longest_run, spread_frames
+from biodance.records import SIDES, Array, Markers, Mask, Trial, Wrench, any_coordinate, longest_run, spread_frames
 from biodance.settings import STANDARD_GRAVITY, StandingRules
 
 WINDOW = 0.5
@@ -451,6 +451,23 @@ def turn_to(up: Array) -> Array:
     return np.stack([first, np.cross(up, first), up]) + 0.0
 
 
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Units in which laboratories write lengths, m."""
+PERSON_SPAN = 1.5
+"""m, largest extent of the markers on a person: 0.9 for legs alone to 2.3 with arms spread or raised."""
+
+
+def likely_unit(size: float, metres: float = PERSON_SPAN) -> str:
+    """Return the unit of `METRES` in which a ``size`` comes nearest to so many ``metres``."""
+    return min(METRES, key=lambda unit: abs(np.log(size * METRES[unit] / metres)))
+
+
+def extents(xyz: Array, least: int) -> Array:
+    """Return the sides (n, 3) of the box about markers (T, K, 3) in each of the frames that show ``least`` of them."""
+    frames = xyz[(~any_coordinate(~np.isfinite(xyz))).sum(axis=1) >= least]
+    return np.asarray(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)) if len(frames) else np.empty((0, 3))
+
+
 def body_is_tall_along_z(xyz: Array) -> bool:
     """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
 
@@ -458,11 +475,8 @@ def body_is_tall_along_z(xyz: Array) -> bool:
     arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
     False.
     """
-    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
-    if seen.shape[1] < 2:
+    sides = extents(xyz, 2)
+    if not len(sides):
         return False
-    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
-    if not len(frames):
-        return False
-    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    extent = np.median(sides, axis=0)
     return bool(extent[2] > _CLEARLY_TALLER * extent[1])

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.records import Array, Plate, Trial, Wrench
+from biodance.records import Array, Plate, Trial, Wrench, grouped
 from biodance.records.attention import Doubt
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
@@ -265,11 +265,8 @@ def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials with every plate that was put by the feet (``Plate.put``) at the median of what they say, and
     notes: a plate does not move between the trials of one visit, while people lean otherwise in each.
     """
-    puts: dict[str, list[Array]] = {}
-    for trial in trials:
-        for plate in trial.plates:
-            if plate.put is not None:
-                puts.setdefault(plate.name, []).append(plate.put)
+    plates = (plate for trial in trials for plate in trial.plates)
+    puts = grouped((plate.name, plate.put) for plate in plates if plate.put is not None)
     place, notes = {}, list[str]()
     for name, found in puts.items():
         apart = float(np.ptp(found, axis=0).max())

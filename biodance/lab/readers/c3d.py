@@ -12,7 +12,7 @@ from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import MarkerSet, recognise
-from biodance.lab.markers.upright import axis_to_head, clear_axis, turn_to
+from biodance.lab.markers.upright import axis_to_head, clear_axis, extents, turn_to
 from biodance.lab.plates.corners import Told, is_rectangle
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
 
@@ -191,10 +191,10 @@ def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
     """Refuse a file in which nothing says which way is up and the markers are far longer along x or y than along z."""
     if markers is None or len(markers.names) < _CLOUD:
         return
-    frames = markers.xyz[markers.seen.sum(axis=1) >= _CLOUD]
-    if not len(frames):
+    sides = extents(markers.xyz, _CLOUD)
+    if not len(sides):
         return
-    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    extent = np.median(sides, axis=0)
     longest = int(np.argmax(extent))
     if longest != 2 and extent[longest] > _LONGER * extent[2]:
         raise FileRefused(

@@ -17,7 +17,7 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import read_marker_set, recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
-from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z, turn_to
+from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
 from biodance.lab.plain_text import COMMAS_READ, decode, read_bytes, sha256
 from biodance.lab.plates.corners import Told
 from biodance.lab.plates.parameters import channel_groups
@@ -270,9 +270,6 @@ def sniff(head: bytes) -> bool:
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 _IN_SECONDS = 1.5
 """Steps of a time column up to which it is in s (in ms, µs beyond): from 0.7 Hz on, so from 667 Hz down in ms."""
-_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-_PERSON = 1.5
-"""m, largest extent of the markers on a person: 0.9 for legs alone to 2.3 with arms spread or raised."""
 
 
 def read(path: Path, *, role: Role, subject: str | None = None, told: Told | None = None) -> Trial:
@@ -357,19 +354,19 @@ def _markers(cells: Cells, columns: TableColumns, stamps: Array, path: Path) -> 
     names = tuple(columns.markers)
     raw = cells.values[:, np.array([columns.markers[name] for name in names])]
     raw, zeros = unseen_at_origin(raw)
-    seen = raw[np.isfinite(raw).all(axis=2).sum(axis=1) >= FEWEST_MARKERS]
-    extent = float(np.median((np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)).max(axis=1))) if len(seen) else 0.0
+    sides = extents(raw, FEWEST_MARKERS)
+    extent = float(np.median(sides.max(axis=1))) if len(sides) else 0.0
     if not extent > 0:
         raise FileRefused(f"{path}: no row shows {FEWEST_MARKERS} markers apart. Check what the columns hold.")
     written = {plain for k in columns.markers.values() for i in k if (plain := cells.units[i].lower())}
     label = columns.length or (written.pop() if len(written) == 1 else "")
-    unit = label if label in _METRES else min(_METRES, key=lambda u: abs(math.log(extent * _METRES[u] / _PERSON)))
-    by = "as the labels say" if label in _METRES else f"the markers span {extent:.4g}"
-    if not 0.05 <= extent * _METRES[unit] <= 50:
+    unit = label if label in METRES else likely_unit(extent)
+    by = "as the labels say" if label in METRES else f"the markers span {extent:.4g}"
+    if not 0.05 <= extent * METRES[unit] <= 50:
         raise FileRefused(
-            f"{path}: the markers of one row span {extent * _METRES[unit]:.2g} m in {unit}. Correct the unit."
+            f"{path}: the markers of one row span {extent * METRES[unit]:.2g} m in {unit}. Correct the unit."
         )
-    markers = Markers(names, np.arange(len(stamps), dtype=float), raw * _METRES[unit])
+    markers = Markers(names, np.arange(len(stamps), dtype=float), raw * METRES[unit])
     up = axis_to_head(markers, recognise(names))
     if up is None:
         up = np.eye(3)[2 if body_is_tall_along_z(markers.xyz) else 1]

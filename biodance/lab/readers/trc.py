@@ -13,7 +13,7 @@ from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.sets import recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import resampled, time_axis
-from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
+from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents
 from biodance.lab.plain_text import (
     COMMAS_READ,
     cells,
@@ -29,7 +29,6 @@ from biodance.lab.readers import head_text
 from biodance.lab.readers.mot import has_plates, plates_of
 from biodance.records import Array, Markers, Role, Source, Trial
 
-_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _HEADER_ROWS = 4
 _WIDEST = 50.0  # m, between the markers of one frame
 _NARROWEST = 0.05  # m, the same of a hand
@@ -139,13 +138,14 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     unit = _unit(header, path)
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
-    spread = _spread(values) * _METRES[unit]
+    sides = extents(values, 1).max(axis=1)
+    spread = float(np.median(sides)) * METRES[unit] if sides.size else 0.0
     if spread > _WIDEST or (0 < spread < _NARROWEST and len(names) >= _FEW):
         raise FileRefused(
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."
         )
-    seen, unseen = unseen_at_origin(values * _METRES[unit])
+    seen, unseen = unseen_at_origin(values * METRES[unit])
     (time, xyz), timing = _equal_steps(tuple(names), numbers, raw_time, seen, _rate(header, path), path)
     warnings += timing
     history = [*[COMMAS_READ] * commas, *short, f"Coordinates were read in {unit} and turned into m.", *unseen]
@@ -185,7 +185,7 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
             f"{path}: the time steps vary from {steps.min():g} to {steps.max():g} s, a .trc file holds one rate. "
             f"Resample first."
         )
-    xyz = markers.xyz @ Y_UP_TO_Z_UP / _METRES["mm"]
+    xyz = markers.xyz @ Y_UP_TO_Z_UP / METRES["mm"]
     count, frames = len(markers.names), markers.time.size
     header = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
@@ -229,9 +229,9 @@ def _rate(header: dict[str, str], path: Path) -> float:
 def _unit(header: dict[str, str], path: Path) -> str:
     unit = header.get("Units", "").lower()
     unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
-    if unit not in _METRES:
+    if unit not in METRES:
         raise FileRefused(
-            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(_METRES)}. Correct the third row."
+            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row."
         )
     return unit
 
@@ -285,14 +285,6 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
         [f"{len(short)} rows are short (first: row {short[0]}): their last markers count as not seen."] if short else []
     )
     return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(table), count, 3), said
-
-
-def _spread(values: Array) -> float:
-    """Return the median over frames of the largest extent of the markers (T, K, 3), file units; 0 if none is seen."""
-    known = np.isfinite(values)
-    extent = np.where(known, values, -np.inf).max(axis=1) - np.where(known, values, np.inf).min(axis=1)
-    seen = extent[np.isfinite(extent).any(axis=1)]
-    return float(np.median(seen.max(axis=1))) if len(seen) else 0.0
 
 
 def _equal_steps(

@@ -15,7 +15,7 @@ from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_in
-from biodance.records import CHANNELS, Plate, Source, Trial, Wrench
+from biodance.records import CHANNELS, Plate, Source, Trial, Wrench, grouped
 
 NAMES = ("trials.csv", "recordings.csv", "index.csv")
 """Files that are looked for."""
@@ -102,10 +102,8 @@ def _conditions(trials: list[tuple[IndexedTrial, dict[str, str]]], names: list[s
     chosen = []
     for name in names:
         values = {row.get(name, "") for _, row in trials}
-        visits: dict[str, set[str]] = {}
-        for one, row in trials:
-            visits.setdefault(one.visit, set()).add(row.get(name, ""))
-        if 1 < len(values) <= _KINDS and any(len(some) > 1 for some in visits.values()):
+        visits = grouped((one.visit, row.get(name, "")) for one, row in trials)
+        if 1 < len(values) <= _KINDS and any(len(set(some)) > 1 for some in visits.values()):
             chosen.append(name)
     return chosen
 

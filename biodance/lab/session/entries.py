@@ -105,6 +105,11 @@ class Exchange:
         when = f" from {self.start:g} to {self.end:g} s" if isfinite(self.end) else ""
         return f"{self.one} and {self.other} take each other's places{when}"
 
+    @property
+    def entry(self) -> list[str | float]:
+        """As session.toml says it."""
+        return [self.one, self.other, *((self.start, self.end) if isfinite(self.start) else ())]
+
 
 def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exchange, ...]:
     """Return the exchanges that a list of ``[label, label]`` or ``[label, label, from s, to s]`` says.

@@ -14,23 +14,10 @@ from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.plates.corners import one_place
 from biodance.lab.readers import Reader, extensions, read_trial
+from biodance.lab.session import recordings
 from biodance.lab.session.archive import visit_date
 from biodance.lab.session.entries import unused_labels, with_parts_corrected
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
-from biodance.lab.session.recordings import (
-    EclipseNotes,
-    decimal_commas,
-    each_once,
-    find_recordings,
-    forces_apart,
-    guess_static,
-    of_one_person,
-    recordings_below,
-    refuse_several_people,
-    role_by_eclipse,
-    role_by_name,
-    vicon_notes,
-)
 from biodance.lab.session.subject import identify_subject
 from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
@@ -47,7 +34,7 @@ def visit_words(folder: Path, trials: Iterable[str]) -> Mapping[str, str]:
         said = read_session_file(folder).visit
     except BiodanceError:
         said = VisitEntry()
-    names, eclipse = {name.lower() for name in trials}, vicon_notes([folder] if folder.is_dir() else [])[0]
+    names, eclipse = {name.lower() for name in trials}, recordings.vicon_notes([folder] if folder.is_dir() else [])[0]
     notes = [one for one in eclipse.values() if one.trial.lower() in names]
     described = dict.fromkeys(one.description for one in notes if one.description)
     # CREATIONDATEANDTIME=2020,3,5,11,16,0
@@ -123,8 +110,8 @@ def read_session(
     chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
     worn = str(markers) if markers is not None else file_says.marker_set
     marker_set = read_marker_set(worn) if worn else None
-    files, notes = find_recordings(folder, readers)
-    eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
+    files, notes = recordings.find_recordings(folder, readers)
+    eclipse, measurements, refused = recordings.vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons, labels = dict[str, str](), set[str]()
     for file in files:
@@ -149,10 +136,10 @@ def read_session(
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, files, refused, readers))
-    refuse_several_people(folder, trials, file_says.subject)
-    notes += [*decimal_commas(trials), *forces_apart(trials)]
-    trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
-    trials, strangers = of_one_person(trials, file_says.subject)
+    recordings.refuse_several_people(folder, trials, file_says.subject)
+    notes += [*recordings.decimal_commas(trials), *recordings.forces_apart(trials)]
+    trials = _settle_static(recordings.each_once(trials, notes), file_says, reasons, notes)
+    trials, strangers = recordings.of_one_person(trials, file_says.subject)
     refused |= strangers
     trials, placed = one_place(trials)
     notes += placed
@@ -181,20 +168,22 @@ def session_folder(folder: str | Path) -> Path:
     return folder.resolve() if folder.name in ("", "..") else folder
 
 
-def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNotes | None) -> tuple[Role, str]:
+def _role(
+    file: Path, folder: Path, settings: SessionFile, operator: recordings.EclipseNotes | None
+) -> tuple[Role, str]:
     """Return the role of a recording and why it has it."""
     if role := settings.role(file.stem):
         return role, "session.toml says so"
-    if operator and (role := role_by_eclipse(operator)):
+    if operator and (role := recordings.role_by_eclipse(operator)):
         return role, "the Eclipse notes (.enf) say so"
-    if role := role_by_name(file.stem):
+    if role := recordings.role_by_name(file.stem):
         return role, "guessed from its name"
-    if file.parent != folder and (role := role_by_name(file.parent.name)):
+    if file.parent != folder and (role := recordings.role_by_name(file.parent.name)):
         return role, f"guessed from its folder {file.parent.name}"
     return "fit", "a movement: its name says no other role"
 
 
-def _invalid_strikes(operator: EclipseNotes | None) -> list[str]:
+def _invalid_strikes(operator: recordings.EclipseNotes | None) -> list[str]:
     """Return a warning for every plate that the operator marked as invalid in Eclipse."""
     why = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
     states = operator.plates.items() if operator else ()
@@ -213,7 +202,7 @@ def _settle_static(
             )
     if any(trial.role == "static" for trial in trials):
         return trials
-    guess = guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
+    guess = recordings.guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
     if guess is None or guess.markers is None:
         notes.append(
             "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it "
@@ -236,7 +225,9 @@ def _nothing_left(folder: Path, files: Sequence[Path], refused: Mapping[str, str
     if files:
         names = ", ".join(file.name for file in files[:3]) + (", ..." if len(files) > 3 else "")
         return f"{folder}: every recording ({names}) has the role skip. Give one another role in session.toml."
-    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_below(part, readers)]
+    inside = [
+        part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings.recordings_below(part, readers)
+    ]
     if inside:
         return (
             f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."

@@ -25,7 +25,7 @@ from biodance.lab.plain_text import COMMAS_READ, decode, parse_number, read_byte
 from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.records import Role, Trial
+from biodance.records import Role, Trial, grouped
 from biodance.records.attention import Doubt
 
 _MILLIMETRE = 1e-3
@@ -406,10 +406,8 @@ def refuse_several_people(folder: Path, trials: Sequence[Trial], typed: SubjectE
     for (said, of, unit, alike), told in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
         if told is not None:
             continue
-        parts: dict[Path, list[float]] = {}
-        for trial in trials:
-            if math.isfinite(value := said(trial.measurements)):
-                parts.setdefault(trial.source.path.parent, []).append(value)
+        values = ((trial.source.path.parent, said(trial.measurements)) for trial in trials)
+        parts = grouped((part, value) for part, value in values if math.isfinite(value))
         known = sorted((median(values), part.name) for part, values in parts.items())
         if known and known[-1][0] > alike * known[0][0]:
             raise SessionRefused(

@@ -11,25 +11,11 @@ from biodance.cycles.scores import NormalCurve
 from biodance.cycles.summary import Repetitions
 from biodance.display import GREY, spaced
 from biodance.records import SIDES, Array
-from biodance.report.figures.vector import (
-    LEFT_SIDE,
-    MIDDLE_SIDE,
-    RIGHT_SIDE,
-    Axis,
-    Curve,
-    CurveFigure,
-    Frame,
-    Strip,
-    Stroke,
-    around,
-    panel,
-    points,
-    segments,
-)
+from biodance.report.figures import vector as svg
 from biodance.report.wording import format_number
 
-_LOOKS = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "middle": MIDDLE_SIDE}
-_NORMAL = Stroke(GREY, "1 3", 0.8)
+_LOOKS = {"right": svg.RIGHT_SIDE, "left": svg.LEFT_SIDE, "middle": svg.MIDDLE_SIDE}
+_NORMAL = svg.Stroke(GREY, "1 3", 0.8)
 _THIN, _MOST = 0.4, 12
 """px of one repetition, and repetitions of a side that are drawn; the mean is over all."""
 LEAST_SPANS = {"deg": 10.0, "N·m/kg": 0.2, "W/kg": 0.5, "m": 0.05, "%": 10.0}
@@ -77,28 +63,28 @@ def repetitions_figure(
         same = sorted((one for one in groups if one.quantity == quantity), key=lambda one: list(_LOOKS).index(one.side))
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
-            usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
+            usual = [svg.Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
             theirs = [
-                Curve(f"{one.side}, plug-in gait", one.mean, Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
+                svg.Curve(f"{one.side}, plug-in gait", one.mean, svg.Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
                 for one in found.file_groups
                 if one.quantity == quantity
             ]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
             cells.append(
-                [Strip(curve_title(same[0]), [*usual, *_curves(same), *theirs], least=least, rules=_offs(found))]
+                [svg.Strip(curve_title(same[0]), [*usual, *_curves(same), *theirs], least=least, rules=_offs(found))]
             )
     if not cells:
         return ""
     people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
     band = f"one sd between cycles{people}"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
+    return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
 
 
-def _offs(found: Repetitions) -> list[tuple[float, Stroke]]:
+def _offs(found: Repetitions) -> list[tuple[float, svg.Stroke]]:
     """Return where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side."""
     sides = SIDES if found.kind == "gait" else ("middle",)
     offs = [(found.off(side), _LOOKS[side]) for side in sides]
-    return [(off.mean, Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
+    return [(off.mean, svg.Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
 
 
 def curve_title(group: CurveGroup) -> str:
@@ -108,15 +94,15 @@ def curve_title(group: CurveGroup) -> str:
     return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
 
 
-def _curves(groups: Sequence[CurveGroup]) -> list[Curve]:
+def _curves(groups: Sequence[CurveGroup]) -> list[svg.Curve]:
     """Return the repetitions of each side, thin, then its mean with the band."""
     curves = []
     for group in groups:
         look = _LOOKS[group.side]
-        thin = Stroke(look.colour, look.dash, _THIN)
+        thin = svg.Stroke(look.colour, look.dash, _THIN)
         if len(group.values) > 1:
-            curves += [Curve(group.side, values, thin, kind="each") for values in group.values[:_MOST]]
-        curves.append(Curve(group.side, group.mean, look, group.sd if np.isfinite(group.sd).any() else None))
+            curves += [svg.Curve(group.side, values, thin, kind="each") for values in group.values[:_MOST]]
+        curves.append(svg.Curve(group.side, group.mean, look, group.sd if np.isfinite(group.sd).any() else None))
     return curves
 
 
@@ -130,12 +116,12 @@ def pressure_figure(found: Repetitions) -> str:
     if not ways:
         return ""
     every = np.concatenate(list(ways.values()))
-    x, y = around(every[:, 0], least=120.0), around(every[:, 1], least=150.0)
-    x = Axis(x.low, x.high, "outward of the line heel to toe (mm)")
-    y = Axis(y.low, y.high, "centre of pressure ahead of the heel (mm)")
-    marks = [segments(x, y, way, _LOOKS[side]) for side, way in ways.items()]
-    drawn = panel(
-        x, y, marks, "Mean way of the centre of pressure on each sole.", frame=Frame(width=270.0, height=150.0)
+    x, y = svg.around(every[:, 0], least=120.0), svg.around(every[:, 1], least=150.0)
+    x = svg.Axis(x.low, x.high, "outward of the line heel to toe (mm)")
+    y = svg.Axis(y.low, y.high, "centre of pressure ahead of the heel (mm)")
+    marks = [svg.segments(x, y, way, _LOOKS[side]) for side, way in ways.items()]
+    drawn = svg.panel(
+        x, y, marks, "Mean way of the centre of pressure on each sole.", frame=svg.Frame(width=270.0, height=150.0)
     )
     return f'<div class="cell">{drawn}</div>'
 
@@ -151,18 +137,20 @@ def consistency_figure(found: Repetitions) -> str:
         return ""
     place = {trial: float(k) for k, trial in enumerate(found.trials, 1)}
     ticks = tuple((at, format_number(at, 0)) for at in place.values())
-    x, cells = Axis(0.5, len(place) + 0.5, "trial", ticks), []
+    x, cells = svg.Axis(0.5, len(place) + 0.5, "trial", ticks), []
     for name in _CONSISTENT:
         some = [one for one in found.key_values if one.name == name]
         if some:
-            y = around(np.array([one.value for one in some]), least=LEAST_SPANS[some[0].unit])
-            y = Axis(y.low, y.high, f"{spaced(name)} ({some[0].unit})")
+            y = svg.around(np.array([one.value for one in some]), least=LEAST_SPANS[some[0].unit])
+            y = svg.Axis(y.low, y.high, f"{spaced(name)} ({some[0].unit})")
             marks = []
             for side, shift in (("right", -0.12), ("left", 0.12)):
                 own = [(place[one.cycle.trial] + shift, one.value) for one in some if one.side == side]
                 across, up = np.array(own).reshape(-1, 2).T
                 inside = "" if side == "right" else "#ffffff"
-                marks.append(points(x, y, across, up, _LOOKS[side], inside=inside))
+                marks.append(svg.points(x, y, across, up, _LOOKS[side], inside=inside))
             about = f"{spaced(name)} of every cycle by trial, right and left."
-            cells.append(f'<div class="cell">{panel(x, y, marks, about, frame=Frame(width=270.0, height=80.0))}</div>')
+            cells.append(
+                f'<div class="cell">{svg.panel(x, y, marks, about, frame=svg.Frame(width=270.0, height=80.0))}</div>'
+            )
     return f'<div class="curves"><div class="cells three">{"".join(cells)}</div></div>' if cells else ""

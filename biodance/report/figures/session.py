@@ -14,25 +14,8 @@ from biodance.identification.validation import TrialValidation
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
+from biodance.report.figures import vector as svg
 from biodance.report.figures.style import SIDE_COLOURS
-from biodance.report.figures.vector import (
-    IDENTIFIED,
-    LEFT_SIDE,
-    MEASURED,
-    RIGHT_SIDE,
-    TABLE,
-    Axis,
-    Curve,
-    CurveFigure,
-    Frame,
-    Strip,
-    Stroke,
-    panel,
-    points,
-    rule,
-    segments,
-    with_legend,
-)
 from biodance.report.wording import format_number, millimetres
 
 _LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
@@ -60,7 +43,7 @@ def marker_figure(fit: MarkerFit) -> str:
 
 
 _AROUND = 200.0  # mm that the wide view shows around the feet
-_SQUARE = Frame(width=390.0, height=240.0, left=48.0)
+_SQUARE = svg.Frame(width=390.0, height=240.0, left=48.0)
 
 
 def _turned(place: Array, standing: QuietStanding) -> Array:
@@ -71,40 +54,40 @@ def _turned(place: Array, standing: QuietStanding) -> Array:
     return 1000 * np.stack([arm @ right, arm @ ahead], axis=-1)
 
 
-_COP, _COM = Stroke(BLACK, "", 0.8), Stroke(GREEN, "", 0.8)
+_COP, _COM = svg.Stroke(BLACK, "", 0.8), svg.Stroke(GREEN, "", 0.8)
 
 
-def _paths(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
+def _paths(x: svg.Axis, y: svg.Axis, standing: QuietStanding) -> list[str]:
     out = []
     for path, look, inside in ((standing.cop, _COP, ""), (standing.com, _COM, "#fff")):
         if path.size:
             way = _turned(path, standing)
             right, ahead = np.nanmean(way, axis=0)[:, None]
-            out += [segments(x, y, way, look), points(x, y, right, ahead, look, inside=inside)]
+            out += [svg.segments(x, y, way, look), svg.points(x, y, right, ahead, look, inside=inside)]
     return out
 
 
-def _surroundings(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
+def _surroundings(x: svg.Axis, y: svg.Axis, standing: QuietStanding) -> list[str]:
     out = [
-        segments(x, y, _turned(corners[[0, 1, 2, 3, 0]], standing), Stroke(GREY, "", 0.9))
+        svg.segments(x, y, _turned(corners[[0, 1, 2, 3, 0]], standing), svg.Stroke(GREY, "", 0.9))
         for corners in standing.plates
     ]
-    for side, look in (("left", LEFT_SIDE), ("right", RIGHT_SIDE)):
+    for side, look in (("left", svg.LEFT_SIDE), ("right", svg.RIGHT_SIDE)):
         chosen = [i for i, name in enumerate(standing.foot_names) if name.startswith(side)]
         if chosen:
             inside = "#fff" if side == "left" else ""
             right, ahead = _turned(standing.feet[chosen], standing).T
-            out.append(points(x, y, right, ahead, look, inside=inside))
+            out.append(svg.points(x, y, right, ahead, look, inside=inside))
     return out
 
 
-def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[Axis, Axis]:
+def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[svg.Axis, svg.Axis]:
     """Return two axes of one scale about ``middle`` (2,) that reach at least ``reach`` to each side."""
     aspect = (_SQUARE.width - _SQUARE.left - _SQUARE.right) / _SQUARE.height
     wide, high = reach * max(aspect, 1.0), reach * max(1.0, 1 / aspect)
     return (
-        Axis(middle[0] - wide, middle[0] + wide, labels[0]),
-        Axis(middle[1] - high, middle[1] + high, labels[1]),
+        svg.Axis(middle[0] - wide, middle[0] + wide, labels[0]),
+        svg.Axis(middle[1] - high, middle[1] + high, labels[1]),
     )
 
 
@@ -117,30 +100,34 @@ def standing_figure(standing: QuietStanding) -> str:
     shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
     low, high = np.nanmin(shown, axis=0) - _AROUND, np.nanmax(shown, axis=0) + _AROUND
     x, y = _square((low + high) / 2, float(np.max(high - low)) / 2, labels)
-    wide = panel(x, y, [*_surroundings(x, y, standing), *_paths(x, y, standing)], "feet and plates", frame=_SQUARE)
+    wide = svg.panel(x, y, [*_surroundings(x, y, standing), *_paths(x, y, standing)], "feet and plates", frame=_SQUARE)
     reach = 1.4 * max(20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size))
     x, y = _square(np.zeros(2), float(reach), labels)
-    axes = [rule(x, 0.0, upright=True), rule(y, 0.0, upright=False)]
-    near = panel(x, y, [*axes, *_paths(x, y, standing)], "the middle, enlarged", frame=_SQUARE)
+    axes = [svg.rule(x, 0.0, upright=True), svg.rule(y, 0.0, upright=False)]
+    near = svg.panel(x, y, [*axes, *_paths(x, y, standing)], "the middle, enlarged", frame=_SQUARE)
     words = ["black point: centre of pressure (plates)"]
     words += ["green ring: centre of mass (table)"] if tracked else []
     words += ["blue points: right foot's markers", "orange rings: left foot's"]
-    return with_legend(words, (wide, near))
+    return svg.with_legend(words, (wide, near))
 
 
-def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: NDArray[np.bool_]) -> list[list[Strip]]:
+def _channels(
+    curves: list[tuple[str, Array, svg.Stroke]], measured: Array, used: NDArray[np.bool_]
+) -> list[list[svg.Strip]]:
     """Return for each channel its curves, measured first, over measured minus curve; forces left, moments right."""
     cells = []
     for channel in (0, 3, 1, 4, 2, 5):
         title, least = CHANNEL_TITLES[channel], _LEAST[channel]
-        drawn = [Curve("measured", measured[:, channel], MEASURED)]
-        drawn += [Curve(name, np.where(used, value[:, channel], np.nan), look) for name, value, look in curves]
+        drawn = [svg.Curve("measured", measured[:, channel], svg.MEASURED)]
+        drawn += [svg.Curve(name, np.where(used, value[:, channel], np.nan), look) for name, value, look in curves]
         left = [
-            Curve(name, np.where(used, measured[:, channel] - value[:, channel], np.nan), look)
+            svg.Curve(name, np.where(used, measured[:, channel] - value[:, channel], np.nan), look)
             for name, value, look in curves
         ]
         unit = title[title.index("(") :]
-        cells.append([Strip(title, drawn, least), Strip(f"measured − simulated {unit}", left, least / 2, even=True)])
+        cells.append(
+            [svg.Strip(title, drawn, least), svg.Strip(f"measured − simulated {unit}", left, least / 2, even=True)]
+        )
     return cells
 
 
@@ -148,20 +135,20 @@ def wrench_figure(comparison: WrenchComparison, trial: str = "", *, filled: NDAr
     """Return six channels, measured and simulated with the table, each over its residual; grey frames are left out, in
     yellow ones posture rests on ``filled`` (T,) gaps.
     """
-    curves = [("with the table", comparison.simulated, TABLE)]
+    curves = [("with the table", comparison.simulated, svg.TABLE)]
     cells = _channels(curves, comparison.measured, comparison.used)
     about = "Measured and simulated ground wrench; the numbers are in the table below"
-    return CurveFigure(comparison.time, cells, about, comparison.used, trial, filled=filled).html()
+    return svg.CurveFigure(comparison.time, cells, about, comparison.used, trial, filled=filled).html()
 
 
 def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None = None) -> str:
     """Return six channels, measured, with the table and with the identified parameters, each over its differences;
     grey frames are left out, in yellow ones posture rests on ``filled`` (T,) gaps.
     """
-    curves = [("with the table", one.table.value, TABLE), ("identified", one.identified.value, IDENTIFIED)]
+    curves = [("with the table", one.table.value, svg.TABLE), ("identified", one.identified.value, svg.IDENTIFIED)]
     about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
     cells = _channels(curves, one.measured.value, one.use)
-    return CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
+    return svg.CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
 
 
 def place_words(about: Array) -> str:

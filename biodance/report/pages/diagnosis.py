@@ -16,21 +16,9 @@ from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import Provenance, now
-from biodance.records import CHANNEL_TITLES, CHANNELS
-from biodance.report.figures.vector import (
-    LEFT_SIDE,
-    RIGHT_SIDE,
-    Axis,
-    Curve,
-    CurveFigure,
-    Frame,
-    Strip,
-    Stroke,
-    panel,
-    points,
-    rule,
-    segments,
-)
+from biodance.records import CHANNEL_TITLES, CHANNELS, grouped
+from biodance.report import wording
+from biodance.report.figures import vector as svg
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.tables.diagnosis import (
     CONFUSION_ROW,
@@ -42,19 +30,6 @@ from biodance.report.tables.diagnosis import (
     seen_causes,
 )
 from biodance.report.tables.schema import Row, Schema
-from biodance.report.wording import (
-    NEVER,
-    causes_by_effect,
-    first_upper,
-    format_number,
-    headline_of,
-    loud_and_noted,
-    moment,
-    share_of,
-    size_seen,
-    sized,
-)
-from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -64,17 +39,22 @@ def left_figure(left: tuple[Residuals, Residuals]) -> str:
     time = np.arange(len(before)) / rate
     cells = [
         [
-            Strip(
+            svg.Strip(
                 CHANNEL_TITLES[k],
                 [
-                    Curve(name, np.where(use, value[:, k], np.nan), look)
-                    for name, value, look in (("as it is", before, LEFT_SIDE), ("findings accepted", after, RIGHT_SIDE))
+                    svg.Curve(name, np.where(use, value[:, k], np.nan), look)
+                    for name, value, look in (
+                        ("as it is", before, svg.LEFT_SIDE),
+                        ("findings accepted", after, svg.RIGHT_SIDE),
+                    )
                 ],
             )
         ]
         for k in (0, 3, 1, 4, 2, 5)
     ]
-    return CurveFigure(time, cells, "Measured minus simulated wrench; the numbers are in the table above", use).html()
+    return svg.CurveFigure(
+        time, cells, "Measured minus simulated wrench; the numbers are in the table above", use
+    ).html()
 
 
 def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
@@ -112,29 +92,27 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     """Return per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of
     its places.
     """
-    kinds: dict[str, list[float]] = {}
-    for row in rows:
-        kinds.setdefault(row.effect, []).append(row.limit / row.typical)
+    kinds = grouped((row.effect, row.limit / row.typical) for row in rows)
     order = sorted(kinds, key=lambda name: -np.median(kinds[name]))
     words = ((0.01, "1 %"), (0.1, "a tenth"), (1.0, "typical size"), (10.0, "ten times"))
-    x = Axis(0.008, 30.0, "smallest size that this session would have seen, in typical sizes", words, log=True)
-    y = Axis(-0.6, len(order) - 0.4, "", tuple((float(i), spaced(name)) for i, name in enumerate(order)))
-    marks = [rule(x, 1.0, upright=True, look=Stroke(BLACK, "", 0.9))]
+    x = svg.Axis(0.008, 30.0, "smallest size that this session would have seen, in typical sizes", words, log=True)
+    y = svg.Axis(-0.6, len(order) - 0.4, "", tuple((float(i), spaced(name)) for i, name in enumerate(order)))
+    marks = [svg.rule(x, 1.0, upright=True, look=svg.Stroke(BLACK, "", 0.9))]
     for i, name in enumerate(order):
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
-        marks.append(segments(x, y, np.array([[value.min(), i], [value.max(), i]]), Stroke(GREY, "", 2.5)))
-        marks.append(points(x, y, np.median(value), i, Stroke(BLUE)))
+        marks.append(svg.segments(x, y, np.array([[value.min(), i], [value.max(), i]]), svg.Stroke(GREY, "", 2.5)))
+        marks.append(svg.points(x, y, np.median(value), i, svg.Stroke(BLUE)))
     about = "per kind of cause the smallest size that this session would have seen"
-    drawn = panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
+    drawn = svg.panel(x, y, marks, about, frame=svg.Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
     return f'<div class="single">{drawn}</div>'
 
 
 def estimated(one: Estimate) -> str:
     """Return a parameter with its 95 % interval."""
     if one.sd != one.sd:
-        return sized(one.value, one.unit)
-    low, high = one.interval
-    return f"{sized(one.value, one.unit)} (95 % interval {sized(low, one.unit)} to {sized(high, one.unit)})"
+        return wording.sized(one.value, one.unit)
+    value, low, high = (wording.sized(size, one.unit) for size in (one.value, *one.interval))
+    return f"{value} (95 % interval {low} to {high})"
 
 
 _CERTAIN = 14.0  # Natural logarithm of a million: above it odds are no longer printed
@@ -146,7 +124,7 @@ def odds(log_bayes_factor: float) -> str:
         return "a check of the recording shows it"
     if log_bayes_factor > _CERTAIN:
         return "more than a million times as probable as nothing wrong"
-    return f"{format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
+    return f"{wording.format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
 
 _ENDINGS = {
@@ -161,7 +139,7 @@ _ENDINGS = {
 def probable(probability: float) -> str:
     """Return a probability as text, such as "P = 0.97"; near 0 and 1 by its bound."""
     if 0.005 <= probability < 0.995:
-        return f"P = {format_number(probability, 2)}"
+        return f"P = {wording.format_number(probability, 2)}"
     return "P > 0.99" if probability > 0.5 else "P < 0.01"
 
 
@@ -169,7 +147,7 @@ def how_sure(one: Finding) -> str:
     """Return how sure a finding is: its probability and its odds against nothing wrong, or that a check shows it."""
     said = odds(one.log_bayes_factor)
     if not np.isfinite(one.log_bayes_factor):
-        return f"{first_upper(said)}."
+        return f"{wording.first_upper(said)}."
     return f"{probable(one.probability)}; {said}."
 
 
@@ -205,21 +183,21 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
-    others, noted = loud_and_noted(one.attention)
+    others, noted = wording.loud_and_noted(one.attention)
     witnesses = _witnesses(one.witnesses)
     witnessed = {(row["effect"], row["target"]) for row in witnesses["seen"]} if witnesses else set()
     blind = LIMIT_ROW.rows(row for row in one.unobservable if (row.effect, row.target) not in witnessed)
-    never = [row for row in blind if size_seen(row["limit"], row["typical"], row["unit"]) == NEVER]
-    made = f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
+    never = [row for row in blind if wording.size_seen(row["limit"], row["typical"], row["unit"]) == wording.NEVER]
+    made = f"biodance {provenance.versions['biodance']}, {wording.moment(provenance.created)}"
     return render(
         "diagnosis.html.j2",
         filters={
-            "sized": sized,
+            "sized": wording.sized,
             "estimated": estimated,
             "how_sure": how_sure,
             "probable": probable,
-            "share": share_of,
-            "first_upper": first_upper,
+            "share": wording.share_of,
+            "first_upper": wording.first_upper,
             "spaced": spaced,
         },
         scripts=[template_text("curves.js")],
@@ -227,11 +205,11 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         named=cause_in_words,
         schemas={"limit": LIMIT_ROW, "observed": OBSERVED_ROW, "visibility": VISIBILITY_ROW, "mass": _MASS},
         unseen=[row for row in blind if row not in never],
-        never=causes_by_effect((row["effect"], row["target"]) for row in never),
+        never=wording.causes_by_effect((row["effect"], row["target"]) for row in never),
         result=result,
         one=one,
         ending=_ENDINGS[one.status],
-        headline=headline_of(one.attention),
+        headline=wording.headline_of(one.attention),
         others=others,
         noted=noted,
         failures={**result.failures, **found.failures},
@@ -261,12 +239,8 @@ def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:
     if evidence is None:
         return None
     rows = VISIBILITY_ROW.rows(cause_visibilities(evidence))
-    unseen: dict[str, list[str]] = {}
-    for row in rows:
-        if not row["witnesses"]:
-            unseen.setdefault(" ".join(row["would_be_seen_by"]), []).append(
-                cause_in_words(row["effect"], row["target"])
-            )
+    blind = (row for row in rows if not row["witnesses"])
+    unseen = grouped((" ".join(row["would_be_seen_by"]), cause_in_words(row["effect"], row["target"])) for row in blind)
     return {
         "seen": [row for row in rows if row["witnesses"]],
         "unseen": [("; ".join(causes), would) for would, causes in unseen.items()],
@@ -286,11 +260,10 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         "foresight.html.j2",
         found=document,
         movement=name,
-        version=__version__,
         created=now(),
         schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
         first=FIRST,
-        seen=causes_by_effect(seen_causes(document)),
-        hidden=causes_by_effect((row["effect"], row["target"]) for row in document["unobservable"]),
-        some=lambda causes: causes_by_effect(cause.partition(" ")[::2] for cause in causes),
+        seen=wording.causes_by_effect(seen_causes(document)),
+        hidden=wording.causes_by_effect((row["effect"], row["target"]) for row in document["unobservable"]),
+        some=lambda causes: wording.causes_by_effect(cause.partition(" ")[::2] for cause in causes),
     )

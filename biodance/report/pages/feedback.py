@@ -26,7 +26,6 @@ from biodance.report.files import refuse_page, write_files
 from biodance.report.pages.language import ENGLISH, Language, read_language, script_words
 from biodance.report.pages.template import render, script_json, template_text, three_js
 from biodance.report.tables.schema import Schema
-from biodance.version import __version__
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
 """Segment -> the point at its origin."""
@@ -277,7 +276,6 @@ def feedback_page(
         name=spaced(name),
         care=[words.say(one) for one in care],
         unsafe=unsafe,
-        version=__version__,
         style=Markup(template_text("feedback.css")),
         program=Markup(program),
         visit=Markup(visit),

@@ -17,7 +17,7 @@ from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.pipeline.still import silhouettes
 from biodance.records import SIDES, Array
-from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, around, curve_line, panel
+from biodance.report.figures import vector as svg
 from biodance.report.pages.language import ENGLISH, N_, Language, read_language
 from biodance.report.pages.template import render, template_text
 
@@ -118,12 +118,12 @@ def _knee_curves(found: Repetitions, words: Language) -> str:
         return ""
     gait = found.kind == "gait"
     along = words.say("from one step to the next of the same foot") if gait else words.say("from start to end")
-    x = Axis(0.0, 100.0, along, ())
-    y = around(np.concatenate(list(means.values())), least=20.0, label=words.say("bend of the knee (degrees)"))
-    looks = {"right": RIGHT_SIDE, "left": LEFT_SIDE}
-    marks = [curve_line(x, y, PERCENT, means[side], looks[side], name=words.say(_SIDES[side])) for side in SIDES]
+    x = svg.Axis(0.0, 100.0, along, ())
+    y = svg.around(np.concatenate(list(means.values())), least=20.0, label=words.say("bend of the knee (degrees)"))
+    looks = {"right": svg.RIGHT_SIDE, "left": svg.LEFT_SIDE}
+    marks = [svg.curve_line(x, y, PERCENT, means[side], looks[side], name=words.say(_SIDES[side])) for side in SIDES]
     about = words.say("How far each knee bends, right and left.")
-    return panel(x, y, marks, about, frame=Frame(width=480.0, height=150.0))
+    return svg.panel(x, y, marks, about, frame=svg.Frame(width=480.0, height=150.0))
 
 
 _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}

@@ -20,6 +20,7 @@ from biodance.errors import BiodanceError
 from biodance.records import Array
 from biodance.report.tables.schema import Row, Schema, plain_values
 from biodance.report.wording import format_number, millimetres, moment
+from biodance.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -108,14 +109,14 @@ def render(
     """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
 
     Every template knows ``style`` (of the analyst's page, unless another one is among the values), ``policy`` (what its
-    page may do: nothing of the network, and only ``scripts``), ``scripts``, the function ``table`` (`html_table`), and
-    the filters ``number``, ``mm`` and ``moment``.
+    page may do: nothing of the network, and only ``scripts``), ``scripts``, ``version`` (of biodance), the function
+    ``table`` (`html_table`), and the filters ``number``, ``mm`` and ``moment``.
     """
     from markupsafe import Markup
 
     style = template_text("page.css") + template_text("curves.css")
     given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
-    return _compiled(template, tuple((filters or {}).items())).render(**{**given, **values})
+    return _compiled(template, tuple((filters or {}).items())).render(**{"version": __version__, **given, **values})
 
 
 @functools.cache

@@ -5,6 +5,7 @@ everything else is SI.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +15,14 @@ from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.lab.session.results_folder import whole_folder
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, AngleState, Array
+from biodance.report.files import write_tables
 from biodance.report.tables.diagnosis import LIMIT_ROW
 from biodance.report.tables.identification import TENSOR_ORDER, segment_rows
 from biodance.report.tables.schema import Row, Schema, table_of
@@ -138,6 +141,19 @@ def session_tables(
     if movement is not None:
         tables |= movement_tables(movement)
     return tables
+
+
+def write_session_tables(
+    folder: Path | None,
+    result: SessionResult,
+    diagnosis: Diagnosis | None = None,
+    *,
+    movement: SessionMovement | None = None,
+) -> None:
+    """Write the tables of a session in the place of those that its folder holds; nothing without one."""
+    if folder is not None:
+        with whole_folder(folder, over=True) as part:
+            write_tables(session_tables(result, diagnosis, movement), part)
 
 
 def _joined(parts: Iterable["DataFrame | None"], columns: Sequence[str] = ("trial", "time_s")) -> "DataFrame":

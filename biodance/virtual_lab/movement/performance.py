@@ -23,27 +23,7 @@ from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, Role, Wrench, freeze
-from biodance.virtual_lab.movement.posing import (
-    COLUMNS,
-    LEGS_APART,
-    RAISED,
-    SHIFT,
-    WIDTH,
-    Curves,
-    FootStance,
-    Height,
-    Pose,
-    Z,
-    choreograph,
-    leg_tops,
-    pelvis_height,
-    sit,
-    stand_on_feet,
-    take_seat,
-    take_stance,
-    turn_about,
-    upper_body,
-)
+from biodance.virtual_lab.movement import posing
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, smooth_noise, stream
@@ -68,8 +48,8 @@ class Performance:
 
     plan: TrialPlan
     person: Person
-    stance: FootStance
-    curves: Curves
+    stance: posing.FootStance
+    curves: posing.Curves
     node_time: Array
     nodes: Array
     balance_error: float = 0.0
@@ -139,15 +119,15 @@ def perform(
     rng = stream(person.seed, "performance", str(session), plan.name)
     count = round((plan.duration + 2 * MARGIN) * NODE_RATE) + 1
     time = -MARGIN + np.arange(count) / NODE_RATE
-    curves = choreograph(plan, time, rng, sloppiness=tolerances.performance)
-    stance = take_stance(person, plan.stance, centre, heading, rng)
-    pose = upper_body(person, curves, stance, tolerances, rng)
+    curves = posing.choreograph(plan, time, rng, sloppiness=tolerances.performance)
+    stance = posing.take_stance(person, plan.stance, centre, heading, rng)
+    pose = posing.upper_body(person, curves, stance, tolerances, rng)
     target = wanted_pressure(curves, stance) + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
     nodes, error = keep_balance(person, pose, curves, stance, target)
     return Performance(plan, person, stance, curves, time, nodes, error)
 
 
-def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
+def wanted_pressure(curves: posing.Curves, stance: posing.FootStance) -> Array:
     """Return where the centre of pressure should be (T, 2) m: between the feet by share of weight, plus lean."""
     right = curves["shift"]
     forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
@@ -158,7 +138,13 @@ def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
 
 
 def keep_balance(
-    person: Person, pose: Pose, curves: Curves, stance: FootStance, target: Array, *, height: Height = pelvis_height
+    person: Person,
+    pose: posing.Pose,
+    curves: posing.Curves,
+    stance: posing.FootStance,
+    target: Array,
+    *,
+    height: posing.Height = posing.pelvis_height,
 ) -> tuple[Array, float]:
     """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance
     left, m.
@@ -168,7 +154,7 @@ def keep_balance(
     """
     time = curves.time
     xy = target.copy()
-    q = stand_on_feet(person, pose, curves, stance, xy, height=height)
+    q = posing.stand_on_feet(person, pose, curves, stance, xy, height=height)
     for _ in range(_ROUNDS):
         motion = _motion(_splines(time, q), time)
         value = true_wrench(person, motion).value
@@ -179,7 +165,7 @@ def keep_balance(
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
         moved, smooth = _pendulum(error, pendulum, 1.0 / NODE_RATE), np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0
         xy = xy - 0.95 * np.asarray(correlate1d(moved, smooth, axis=0, mode="nearest"))
-        q = stand_on_feet(person, pose, curves, stance, xy, height=height)
+        q = posing.stand_on_feet(person, pose, curves, stance, xy, height=height)
     return q, float(np.abs(error).max())
 
 
@@ -349,16 +335,18 @@ def copy_dance(
     when = np.clip(when, shown.motion.time[0], shown.motion.time[-1])
     smoothed = gaussian_filter1d(shown.pressure, SMOOTH / np.diff(shown.motion.time).mean(), axis=0, mode="nearest")
     values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), smoothed))
-    values[:, RAISED:] = np.clip(values[:, RAISED:], 0.0, 1.0)
-    error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=WIDTH, cutoff=WANDER)
+    values[:, posing.RAISED :] = np.clip(values[:, posing.RAISED :], 0.0, 1.0)
+    error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=posing.WIDTH, cutoff=WANDER)
     for field in _JOINTS:
-        values[:, COLUMNS[field]] += error[:, COLUMNS[field]]
-    values[:, COLUMNS["pelvis"]] += PELVIS * error[:, COLUMNS["pelvis"]]
+        values[:, posing.COLUMNS[field]] += error[:, posing.COLUMNS[field]]
+    values[:, posing.COLUMNS["pelvis"]] += PELVIS * error[:, posing.COLUMNS["pelvis"]]
     if shown.seat:
-        stance = take_seat(centre, heading, rng)
-        values[:, SHIFT] = np.clip(0.5 - pressure[:, 1] / LEGS_APART, 0.0, 1.0)
-        curves = Curves(time, values)
-        nodes = sit(person, upper_body(person, curves, stance, tolerances, rng), curves, stance, shown.seat)
+        stance = posing.take_seat(centre, heading, rng)
+        values[:, posing.SHIFT] = np.clip(0.5 - pressure[:, 1] / posing.LEGS_APART, 0.0, 1.0)
+        curves = posing.Curves(time, values)
+        nodes = posing.sit(
+            person, posing.upper_body(person, curves, stance, tolerances, rng), curves, stance, shown.seat
+        )
         return Performance(shown.plan(duration), person, stance, curves, time, nodes)
     stance, middle, turn = _stand(person, shown, centre, heading, rng)
     target = (
@@ -367,9 +355,9 @@ def copy_dance(
         + performer.sway * tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
     )
     apart = shown.ankle[1, 1] - shown.ankle[0, 1]
-    values[:, SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
-    curves = Curves(time, values)
-    pose = upper_body(person, curves, stance, tolerances, rng)
+    values[:, posing.SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
+    curves = posing.Curves(time, values)
+    pose = posing.upper_body(person, curves, stance, tolerances, rng)
     nodes, missed = keep_balance(person, pose, curves, stance, target, height=_height)
     return Performance(shown.plan(duration), person, stance, curves, time, nodes, missed)
 
@@ -377,13 +365,13 @@ def copy_dance(
 def _fields(shown: Shown) -> Array:
     """Return the plan in the fields of a posture (T, WIDTH), without lean and shift."""
     body, q = shown.body, shown.motion.q
-    angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), WIDTH))
+    angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), posing.WIDTH))
     for field, names in _JOINTS.items():
-        out[:, COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
-    out[:, COLUMNS["pelvis"]] = pelvis_angles(Rotation.from_quat(q[:, 3:7]).as_matrix())
+        out[:, posing.COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
+    out[:, posing.COLUMNS["pelvis"]] = pelvis_angles(Rotation.from_quat(q[:, 3:7]).as_matrix())
     if not shown.seat:
-        out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
-    out[:, RAISED:] = shown.raised
+        out[:, posing.COLUMNS["depth"]] = _depth(shown)[:, None]
+    out[:, posing.RAISED :] = shown.raised
     return out
 
 
@@ -406,7 +394,7 @@ def _depth(shown: Shown) -> Array:
     return np.asarray((highest - pose.position[:, 0, 2]) / length)
 
 
-def _height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
+def _height(person: Person, pose: posing.Pose, curves: posing.Curves, stance: posing.FootStance, xy: Array) -> Array:
     """Return the height (T,) m of the pelvis of the person who copies."""
     raised = np.stack([curves.raised(side) for side in SIDES], axis=1)
     highest, length = _reach(person.body, pose.pelvis_turn, xy, stance.ankle, raised)
@@ -419,19 +407,19 @@ def _reach(body: Body, turn: Array, xy: Array, ankle: dict[str, Array], raised: 
     A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning
     body).
     """
-    tops, length = leg_tops(body, turn, xy, ankle)
+    tops, length = posing.leg_tops(body, turn, xy, ankle)
     return -logsumexp(-SOFTNESS * (tops + AWAY * raised.T), axis=0) / SOFTNESS, length
 
 
 def _stand(
     person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator
-) -> tuple[FootStance, Array, Array]:
+) -> tuple[posing.FootStance, Array, Array]:
     """Return where the person's feet are, the plan's middle (2,) m and the turn (3, 3) from the plan to the lab."""
-    turn = turn_about(Z, np.array([heading]))[0]
+    turn = posing.turn_about(posing.Z, np.array([heading]))[0]
     middle = shown.ankle[:, :2].mean(axis=0) + np.array([0.04, 0.0])
     ankle, foot = {}, {}
     for k, side in enumerate(SIDES):
         xy = centre + turn[:2, :2] @ (shown.ankle[k, :2] - middle) + 0.005 * rng.normal(size=2)
         ankle[side] = np.array([*xy, person.size["ankle_height"]])
-        foot[side] = turn_about(Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
-    return FootStance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn
+        foot[side] = posing.turn_about(posing.Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
+    return posing.FootStance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn

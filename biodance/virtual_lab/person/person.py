@@ -12,19 +12,7 @@ from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.records import SIDES, Array, Sip, Subject, freeze
-from biodance.virtual_lab.person.skeleton import (
-    ARM_AND_LEG,
-    REALISTIC,
-    TRUE_SEGMENTS,
-    LabTolerances,
-    Proportions,
-    build_joints,
-    draw_proportions,
-    glue_markers,
-    on_side,
-    stream,
-    virtual_people,
-)
+from biodance.virtual_lab.person import skeleton
 
 _POPULATION = 0.08
 """Relative standard deviation of what the people of one place have in common beside the tables' midpoint: as published
@@ -82,7 +70,12 @@ def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: floa
 
 
 def draw_sip(
-    size: Proportions, subject: Subject, seed: int, *, tolerances: LabTolerances, population: int | None = None
+    size: skeleton.Proportions,
+    subject: Subject,
+    seed: int,
+    *,
+    tolerances: skeleton.LabTolerances,
+    population: int | None = None,
 ) -> Sip:
     """Draw the true parameters of the 16 segments; their masses add up to the subject's exactly.
 
@@ -91,15 +84,15 @@ def draw_sip(
     that between right and left; ``segment_shape`` that of the linear map of the shape; ``com`` the sd of the CoM shift
     in units of the body's own spread along each axis.
     """
-    table = virtual_people()["segments"][subject.sex]
-    rng = stream(seed, "flesh")
+    table = skeleton.virtual_people()["segments"][subject.sex]
+    rng = skeleton.stream(seed, "flesh")
     factor = {kind: np.exp(tolerances.segment_mass * rng.normal()) for kind in table}
     if population is not None:
-        common = stream(population, "population")
+        common = skeleton.stream(population, "population")
         factor = {kind: own * np.exp(_POPULATION * common.normal()) for kind, own in factor.items()}
     bodies = []
-    for segment in TRUE_SEGMENTS:
-        kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
+    for segment in skeleton.TRUE_SEGMENTS:
+        kind = next((k for k in skeleton.ARM_AND_LEG if segment.endswith(k)), segment)
         percent, *rest = table[kind]
         place = size[kind] * np.array(rest)
         if segment.startswith("left"):
@@ -109,7 +102,7 @@ def draw_sip(
         bodies.append(_stretched(inertia, rng, tolerances.segment_shape, tolerances.com))
     total = sum(J[3, 3] for J in bodies)
     phi = np.concatenate([parameters_of_inertia(J * subject.mass / total) for J in bodies])
-    return Sip(TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))
+    return Sip(skeleton.TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +117,7 @@ class AddedLoad:
     radii: Array = field(default_factory=lambda: np.full(3, 0.03))
 
     def __post_init__(self) -> None:
-        refuse_unknown("segment of the true body", self.segment, TRUE_SEGMENTS)
+        refuse_unknown("segment of the true body", self.segment, skeleton.TRUE_SEGMENTS)
         if not 0 < self.mass < 30:
             raise BiodanceError(f"AddedLoad on {self.segment}: mass = {self.mass} kg; legal: above 0 and below 30 kg.")
         freeze(self, "AddedLoad", place=(3,), radii=(3,))
@@ -149,7 +142,7 @@ class Person:
 
     subject: Subject
     seed: int
-    size: Proportions
+    size: skeleton.Proportions
     body: Body
     habits: Habits
     loads: tuple[AddedLoad, ...] = ()
@@ -160,10 +153,10 @@ class Person:
         """The true body with its loads: the one that moves on the plate."""
         phi = np.array(self.body.sip.phi)
         for load in self.loads:
-            i = 10 * TRUE_SEGMENTS.index(load.segment)
+            i = 10 * skeleton.TRUE_SEGMENTS.index(load.segment)
             phi[i : i + 10] += parameters_of_inertia(true_pseudo_inertia(load.mass, load.place, load.radii))
         return replace(
-            self.body, name="virtual person with loads", sip=Sip(TRUE_SEGMENTS, phi, self.body.sip.covariance)
+            self.body, name="virtual person with loads", sip=Sip(skeleton.TRUE_SEGMENTS, phi, self.body.sip.covariance)
         )
 
     @property
@@ -193,7 +186,7 @@ def make_person(
     subject: Subject,
     seed: int,
     *,
-    tolerances: LabTolerances = REALISTIC,
+    tolerances: skeleton.LabTolerances = skeleton.REALISTIC,
     loads: tuple[AddedLoad, ...] = (),
     session: int = 0,
     joint_shifts: Mapping[str, Array] = NO_SHIFTS,
@@ -206,23 +199,25 @@ def make_person(
     frame of the segment before them. People of one ``population`` have something in common (`draw_sip`).
     """
     t = tolerances
-    size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
+    size = skeleton.draw_proportions(
+        subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis
+    )
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(size, subject, seed, tolerances=t, population=population)
-    joints = build_joints(size)
-    ranges = virtual_people()["range_deg"]
+    joints = skeleton.build_joints(size)
+    ranges = skeleton.virtual_people()["range_deg"]
     lower, upper = np.radians([ranges[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
     limits = JointLimits(
         lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0)
     )
-    boxes = np.stack([_box(sip.of(segment)) for segment in TRUE_SEGMENTS])
+    boxes = np.stack([_box(sip.of(segment)) for segment in skeleton.TRUE_SEGMENTS])
     body = Body(
         "virtual person",
-        TRUE_SEGMENTS,
+        skeleton.TRUE_SEGMENTS,
         joints,
         sip,
         limits,
-        glue_markers(size, seed, session, error=t.marker_placement),
+        skeleton.glue_markers(size, seed, session, error=t.marker_placement),
         boxes,
         boxes,
         {side: _sole(size, side) for side in SIDES},
@@ -230,13 +225,15 @@ def make_person(
     return Person(subject, seed, size, body, _habits(size, seed), tuple(loads))
 
 
-def _with_joints_moved(size: Proportions, shifts: Mapping[str, Array]) -> Proportions:
+def _with_joints_moved(size: skeleton.Proportions, shifts: Mapping[str, Array]) -> skeleton.Proportions:
     moved = np.array(size.centre_shift)
     for joint, shift in shifts.items():
         refuse_unknown("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
         side, _, kind = joint.rpartition("_")
         moved[
-            TRUE_SEGMENTS.index(f"{side}_{_BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])
+            skeleton.TRUE_SEGMENTS.index(
+                f"{side}_{_BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind]
+            )
         ] += shift
     return replace(size, centre_shift=moved)
 
@@ -249,18 +246,18 @@ def _box(phi: Array) -> Array:
     return np.stack([com - half, com + half])
 
 
-def _sole(size: Proportions, side: str) -> Foot:
+def _sole(size: skeleton.Proportions, side: str) -> Foot:
     """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (Millard et al. 2017)."""
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     right = [(back, 0.6 * half), (0.55 * front, half), (front, 0.5 * half)]
     corners = [*right, *((x, -z) for x, z in reversed(right))]
-    outline = [on_side(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
-    return Foot(TRUE_SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
+    outline = [skeleton.on_side(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
+    return Foot(skeleton.TRUE_SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
 
 
-def _habits(size: Proportions, seed: int) -> Habits:
+def _habits(size: skeleton.Proportions, seed: int) -> Habits:
     """Draw how the person stands and carries head, trunk and arms."""
-    rng = stream(seed, "habits")
+    rng = skeleton.stream(seed, "habits")
     mean_sd = {
         "lumbar_flexion": (2.0, 2.0),
         "thorax_flexion": (3.0, 2.0),
@@ -310,7 +307,7 @@ def _fit_prosthesis(sip: Sip, segment: str, less: float) -> Sip:
     if first not in _REPLACED or side not in ("right", "left"):
         legal = tuple(f"{side}_{one}" for side in ("right", "left") for one in _REPLACED)
         raise UnknownName.of("segment that a prosthesis begins with", segment, legal)
-    limb = [TRUE_SEGMENTS.index(f"{side}_{part}") for part in _REPLACED[first]]
+    limb = [skeleton.TRUE_SEGMENTS.index(f"{side}_{part}") for part in _REPLACED[first]]
     bodies, mass = [of_parameters(phi) for phi in sip.phi.reshape(-1, 10)], float(sip.mass[limb].sum())
     if not 0 < less < mass:
         raise BiodanceError(
