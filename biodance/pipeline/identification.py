@@ -442,9 +442,10 @@ def predicted(
     about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
     notes = list(one.notes)
     if parts[1]:
-        plates = plate_readings(found, parts[0])
-        parts[1] = tuple(plates.taken_off(fit, identified) for fit in parts[1])
-        told = plates.told(parts[0], identified)
+        beside = (one.posterior or one).identification  # both methods are compared on the same wrench
+        plates = plate_readings(beside, parts[0])
+        parts[1] = tuple(plates.taken_off(fit, beside.identified) for fit in parts[1])
+        told = plates.told(parts[0], beside.identified)
         notes += [TAKEN_OFF.format(told)] * bool(told)
     fitted, kept = (
         tuple(validate(found.body, identified, fit, about=about, mass=mass) for fit in some) for some in parts
