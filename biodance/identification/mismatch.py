@@ -43,12 +43,25 @@ the parameters absorb part of what is noise)."""
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of
-    errors e, each of one standard deviation. Behind the plates stand the shares of `Body.parts`, and the corrections
-    of the plates that were made (`Fit.doubts`).
+    errors e, each of one standard deviation. Behind the plates stand the corrections that were made (`Fit.doubts`), and
+    the shares of `Body.parts`. ``rows``: what the same trials tell of parameters, plates and corrections together; None
+    where nobody asked.
     """
 
     kinematics: Array
     plates: Array
+    rows: "PlateRows | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class PlateRows:
+    """The equations of p parameters and m errors of plates and corrections, X = [W E]: ``normal`` X' S^-1 X (p + m,
+    p + m), ``target`` X' S^-1 y (p + m,) and ``kinematics`` X' S^-1 e (p + m, n).
+    """
+
+    normal: Array
+    target: Array
+    kinematics: Array
 
 
 @dataclass(frozen=True)
@@ -59,36 +72,42 @@ class Sizes:
     noise: float
 
 
-def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float | None = None) -> Mismatch:
-    """Return the scores of kinematics and plates over all trials.
+def mismatch(
+    body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float | None = None, with_rows: bool = False
+) -> Mismatch:
+    """Return the scores of kinematics and plates over all trials; ``with_rows`` what they tell of the plates, too.
 
     Skin and flesh slide ``softer`` times as much as the table says, by default as the markers show (`softness`).
     """
     whole, found = parts_as_segments(body), nothing(body)
-    sources = of_markers(whole)
-    scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
-    doubt_scores = np.zeros((len(scores), max((fit.doubts.shape[2] for fit in fits), default=0)))
+    sources, size = of_markers(whole), len(found.kinematics)
+    doubts = max((fit.doubts.shape[2] for fit in fits), default=0)
+    asked = size + (PLATE_SOURCES + doubts) * with_rows
+    scores = np.zeros((asked, found.kinematics.shape[1]))
+    products = np.zeros((asked, size + found.plates.shape[1] + doubts + 1))
     for fit, pick in long_runs(fits, noise.bands):
         motion = fit.motion.at(pick)
-        weight, wrong = _weighed(body, motion, noise.at(fit.motion.rate))
-        plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
-        del wrong  # a tenth of what a long run keeps
-        if doubt_scores.size:
-            doubt_scores += np.tensordot(weight, fit.doubts[pick], axes=((0, 1), (0, 1)))
+        white = noise.at(fit.motion.rate)
+        beside = fit.doubts[pick] if fit.doubts.size else np.zeros((pick.size, 6, doubts))
+        rows = np.concatenate([*_rows(body, motion, white, beside), fit.wrench.value[pick][:, :, None]], axis=2)
+        weight = white.weighted(rows[:, :, :asked])
+        products += np.tensordot(weight, rows, axes=((0, 1), (0, 1)))
+        del rows  # a half of what a long run keeps
         scores += transpose(sources, Response.of(whole, motion), weight).T
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = softness(body, fits, noise.bands) if softer is None else softer
     scores *= np.where(soft, more, 1.0) * deviations(whole, sources)
-    return Mismatch(scores, np.column_stack([plate_scores, doubt_scores]))
+    told = PlateRows(products[:, :asked], products[:, -1], scores) if with_rows else None
+    return Mismatch(scores[:size], products[:size, size:-1], told)
 
 
-def _weighed(body: Body, motion: Motion, noise: Noise) -> tuple[Array, Array]:
-    """Return S^-1 W (F, 6, p) of a run, and the errors (F, 6, m) of plates and of the shares of parts in its wrench."""
+def _rows(body: Body, motion: Motion, noise: Noise, doubts: Array) -> tuple[Array, ...]:
+    """Return the regressor W (F, 6, p) of a run, and the errors of plates, the ``doubts`` (F, 6, n) and the errors of
+    the shares of parts in its wrench.
+    """
     links = regressor_of(segment_motion(body, motion), gravity=body.gravity)
     W = links if body.sharing is None else links @ body.sharing
-    plates = plate_errors(W @ body.sip.phi, motion.rate, noise, plate_sources())
-    wrong = np.concatenate([plates, links @ share_errors(body)], axis=2)
-    return noise.weighted(W), wrong
+    return W, plate_errors(W @ body.sip.phi, motion.rate, noise, plate_sources()), doubts, links @ share_errors(body)
 
 
 def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
@@ -186,13 +205,17 @@ def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
     """
     R = data.triangle
     H = R.T @ R
-    C = covariance(H, found, sizes)
-    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    value, vector = np.linalg.eigh(C / np.outer(scale, scale))
-    keep = value > 1e-13 * value.max()
-    half = (vector[:, keep] / np.sqrt(value[keep])).T / scale
+    half = inverse_root(covariance(H, found, sizes))
     rows = np.linalg.qr(np.column_stack([half @ H, half @ (R.T @ data.target)]), mode="r")
     triangle = np.zeros_like(data.R)
     triangle[: len(rows)] = rows
     triangle[-1, -1] = np.hypot(triangle[-1, -1], data.R[-1, -1])
     return Information(triangle, data.frames)
+
+
+def inverse_root(C: Array) -> Array:
+    """Return X (k, p) with X' X = C^+ of a covariance ``C`` (p, p), directions that nothing moves left out."""
+    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    value, vector = np.linalg.eigh(C / np.outer(scale, scale))
+    keep = value > 1e-13 * value.max()
+    return np.asarray((vector[:, keep] / np.sqrt(value[keep])).T / scale)

@@ -19,6 +19,7 @@ from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.loads import nearest_segment
+from biodance.identification.plate_readings import plate_readings
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
@@ -208,6 +209,11 @@ def _median(found: list[tuple[str, float, float]], by: WeighedBy) -> Weighing | 
     return Weighing(mass, sd, by, tuple(dict.fromkeys(name for name, *_ in known)))
 
 
+TAKEN_OFF = (
+    "Within the tolerances of plates these read {} beside the body, in the mean of the trials that were fitted: taken "
+    "off the trials that were kept, before table and identified body are compared there."
+)
+"""What is said of plates whose errors the fitted trials tell."""
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
 KEPT_ROLES: tuple[Role, ...] = ("validate", "check")
 
@@ -383,7 +389,7 @@ def identify_trials(
     load = replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference)
     changes = _changes(reference, found, failures)
     one = SessionIdentification(name, found, (), (), {}, None, load, changes, notes=found.notes, failures=failures)
-    told = one if found.status == "failed" else predicted(one, results, weighed)
+    told = one if found.status == "failed" else predicted(one, results, weighed, corrections)
     return _weighed(told, reference) if reference is not None and found.status == "solved" else told
 
 
@@ -425,16 +431,25 @@ def _changes(
 
 
 def predicted(
-    one: SessionIdentification, results: tuple[TrialResult, ...], weighed: Weighing | None
+    one: SessionIdentification,
+    results: tuple[TrialResult, ...],
+    weighed: Weighing | None,
+    corrections: tuple[PlateCorrection, ...] = (),
 ) -> SessionIdentification:
-    """Return the same with what the identified body predicts of all trials."""
+    """Return the same with what the identified body predicts of all trials, in which ``corrections`` were made."""
     found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
-    parts = [fits_of_roles(results, roles) for roles in (FITTED_ROLES, KEPT_ROLES)]
+    parts = [fits_of_roles(results, roles, *corrections) for roles in (FITTED_ROLES, KEPT_ROLES)]
     about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
+    notes = list(one.notes)
+    if parts[1]:
+        beside = (one.posterior or one).identification  # both methods are compared on the same wrench
+        plates = plate_readings(beside, parts[0])
+        parts[1] = tuple(plates.taken_off(fit, beside.identified) for fit in parts[1])
+        told = plates.told(parts[0], beside.identified)
+        notes += [TAKEN_OFF.format(told)] * bool(told)
     fitted, kept = (
         tuple(validate(found.body, identified, fit, about=about, mass=mass) for fit in some) for some in parts
     )
-    notes = list(one.notes)
     if not kept:
         notes.append(
             "No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role "

@@ -324,5 +324,5 @@ def by_paper(result: SessionResult) -> SessionResult:
     if found.status == "failed":
         one = replace(one, failures={**beside.failures, "segments": found.cause}, agreements={}, shown=None)
     else:
-        one = replace(predicted(one, result.trials, result.weighed), shown=None)
+        one = replace(predicted(one, result.trials, result.weighed, result.corrections), shown=None)
     return replace(result, identification=one)

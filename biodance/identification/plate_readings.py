@@ -1,0 +1,107 @@
+"""What the trials that were fitted tell of their plates: errors within the tolerances of installed ones (a millimetre,
+some milliradians, a few per mille of crosstalk, a newton of zero), most probable beside the identified body. Intervals
+count them; and since the same plates err alike in movement that was kept, they are taken off it before bodies are
+compared there.
+
+With X = [W E], E the errors of one standard deviation each, X' S^-1 (y - W phi) is X' S^-1 E z, with noise and wrong
+kinematics of the covariance of `mismatch`, and z ~ N(0, 1). At the identified phi, E[z | phi] is the mean that z would
+have in a joint fit: the posterior is Gaussian, and phi its mean. Identification took for noise what the plates read,
+and in the mean of a trial that is most of it: the noise is learned once more without.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identification.identification import Identification
+from biodance.identification.knowledge import SIGMAS
+from biodance.identification.learning import START, WORTH
+from biodance.identification.mismatch import inverse_root, mismatch
+from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.motion.dynamics import predict_wrench
+from biodance.records import CHANNELS, Array, Wrench
+from biodance.threads import Sendable
+from biodance.uncertainty.learning import noise_of
+from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.plates import plate_errors, plate_sources
+
+
+@dataclass(frozen=True, eq=False)
+class PlateReadings(Sendable):
+    """Errors of the plates as fitted trials tell them.
+
+    ``size`` (m,) of each source of `plates.SOURCES`, behind them of the corrections that were made (`Fit.doubts`), in
+    their standard deviations; ``covariance`` (m, m); ``layout`` with the point that they are described about.
+    """
+
+    size: Array
+    covariance: Array
+    layout: Noise
+
+    def rows(self, fit: Fit, body: Body) -> Array:
+        """Return (T, 6, m) N, N·m about the lab origin: what one standard deviation of each adds to the wrench that the
+        ``body`` needs in a trial.
+        """
+        wrench = predict_wrench(body, fit.motion).value
+        rows = plate_errors(wrench, fit.motion.rate, self.layout, plate_sources())
+        more = fit.doubts if fit.doubts.size else np.zeros((len(wrench), 6, len(self.size) - rows.shape[2]))
+        return np.concatenate([rows, more], axis=2)
+
+    def taken_off(self, fit: Fit, body: Body) -> Fit:
+        """Return a trial of ``body`` as its plates would have recorded it without their errors."""
+        rows = self.rows(fit, body)
+        return replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - rows @ self.size))
+
+    def told(self, fits: Sequence[Fit], body: Body) -> str:
+        """Return in words what the plates read beside the ``body`` in the mean of some trials, with 95 % intervals; ""
+        where nothing is sure.
+        """
+        frames = np.concatenate([self.rows(fit, body)[fit.use] for fit in fits])
+        rows = self.layout.shift @ frames.mean(axis=0)
+        mean = rows @ self.size
+        sd = np.sqrt(np.diag(rows @ self.covariance @ rows.T))
+        sure = [
+            f"{channel} {value:+.1f} ± {SIGMAS * one:.1f} {'N' if channel[0] == 'F' else 'N·m'}"
+            for channel, value, one in zip(CHANNELS, mean, sd, strict=True)
+            if abs(value) > SIGMAS * one
+        ]
+        return ", ".join(sure)
+
+
+def plate_readings(found: Identification, fits: tuple[Fit, ...]) -> PlateReadings:
+    """Return what the trials that were fitted tell of their plates beside the body that was ``found``.
+
+    Parameters
+    ----------
+    found : Identification
+        With its noise and the sizes of what disturbs it.
+    fits : tuple of Fit
+        The trials that it was identified from, at least one; each with the doubts of the corrections made in it.
+
+    Returns
+    -------
+    PlateReadings
+        Mean and covariance of the errors, the uncertainty of the parameters counted.
+    """
+    used, about, _ = usable(found.body, fits)
+    first = _readings(found, used, found.noise)
+    off = tuple(first.taken_off(fit, found.identified) for fit in used)
+    left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
+    moments = left.moments(found.sip.phi, found.posterior.covariance)
+    return _readings(found, used, replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH)))
+
+
+def _readings(found: Identification, used: tuple[Fit, ...], noise: Noise) -> PlateReadings:
+    """Return what the ``used`` trials tell of their plates under a ``noise``."""
+    rows = mismatch(found.body, used, noise, with_rows=True).rows
+    assert rows is not None
+    phi, H, sizes = found.sip.phi, rows.normal, found.sizes
+    half = inverse_root(sizes.noise * H + sizes.kinematics**2 * rows.kinematics @ rows.kinematics.T)
+    of_body, of_plates = np.split(half @ H, [len(phi)], axis=1)
+    after = np.linalg.inv(of_plates.T @ of_plates + np.eye(of_plates.shape[1]))
+    gain = after @ of_plates.T
+    slope = gain @ of_body
+    covariance = after + slope @ found.posterior.covariance @ slope.T
+    return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, layout_for(noise.about))
