@@ -149,7 +149,7 @@ def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.02, ("Fx",)), (2.0, ())])
-def test_no_sign_is_told_by_a_force_that_another_likely_body_would_need_the_other_way(share, told) -> None:
+def test_no_sign_is_told_that_hangs_on_how_the_mass_is_shared(share, told) -> None:
     """Who bows fast moves trunk and pelvis against each other: 10 N are left of them, either way."""
     needed = np.zeros((200, 6))
     needed[:, 0] = 10 * np.sin(np.arange(200))
