@@ -1,6 +1,8 @@
 """What fitted trials tell of their plates: known errors come back in kept movement, sound plates stay sound."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.mismatch import mismatch
 from biodance.identification.plate_readings import PlateReadings, plate_readings
 from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.validation import validate
 from biodance.motion.dynamics import predict_wrench
+from biodance.pipeline.identification import _on_fitted_plates
 from biodance.records import Subject, Wrench
 from biodance.uncertainty.plates import PLATE_SOURCES, SOURCES, plate_errors, plate_sources
 
@@ -49,17 +53,19 @@ def _told(seed: int, wrong: dict[str, float], doubt: float = 0.0) -> tuple[Ident
             for f in (fit, kept)
         )
     found = identify_body(body, (fit,))
-    return found, plate_readings(found, (fit,)), fit, kept
+    return found, plate_readings(found, (fit,), found.identified), fit, kept
 
 
-def _left(fit: Fit, found: Identification) -> np.ndarray:
-    return np.asarray((fit.wrench.value - predict_wrench(found.identified, fit.motion).value).mean(axis=0))
+def _left(fit: Fit, found: Identification, plates: PlateReadings | None = None) -> np.ndarray:
+    """Return (6,) the mean that the identified body leaves, with or without what the plates add."""
+    added = plates.added(fit, found.identified) if plates else 0.0
+    return np.asarray((fit.wrench.value - added - predict_wrench(found.identified, fit.motion).value).mean(axis=0))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_errors_of_the_plates_are_taken_off_movement_that_was_kept(seed: int) -> None:
     found, plates, _, kept = _told(seed, WRONG)
-    before, after = (np.abs(_left(fit, found)) for fit in (kept, plates.taken_off(kept, found.identified)))
+    before, after = (np.abs(_left(kept, found, told)) for told in (None, plates))
     weight = 9.81 * found.sip.mass.sum()
     assert before[0] > 0.003 * weight
     assert after[0] < 0.3 * before[0]
@@ -69,7 +75,7 @@ def test_errors_of_the_plates_are_taken_off_movement_that_was_kept(seed: int) ->
 def test_sound_plates_are_hardly_touched() -> None:
     for seed in (4, 5):
         found, plates, fit, kept = _told(seed, {})
-        moved = plates.taken_off(kept, found.identified).wrench.value - kept.wrench.value
+        moved = plates.added(kept, found.identified)
         rows = plates.rows(kept, found.identified)
         allowed = np.sqrt(np.mean(np.einsum("tci,ij,tcj->tc", rows, np.eye(rows.shape[2]), rows), axis=0))
         assert np.all(np.sqrt(np.mean(moved**2, axis=0)) < allowed)
@@ -90,10 +96,37 @@ def test_what_is_told_holds_the_truth() -> None:
 def test_what_is_left_of_a_correction_is_taken_off_too() -> None:
     found, plates, fit, kept = _told(7, {}, doubt=2.0)
     assert plates.size.shape == (PLATE_SOURCES + 1,)
-    assert abs(_left(plates.taken_off(kept, found.identified), found)[1]) < 0.2 * abs(_left(kept, found)[1])
+    assert abs(_left(kept, found, plates)[1]) < 0.2 * abs(_left(kept, found)[1])
     assert plates.told((fit,), found.identified).startswith("Fy +")
     plain = replace(kept, doubts=np.zeros((0, 6, 0)))
-    assert np.isfinite(plates.taken_off(plain, found.identified).wrench.value).all()
+    assert np.isfinite(plates.added(plain, found.identified)).all()
+
+
+def test_every_body_is_compared_with_what_the_plates_read_beside_it() -> None:
+    """A wrong body leaves more to the plates, and is forgiven that: the gain is what is left of it then."""
+    found, plates, fit, kept = _told(1, WRONG)
+    beside_table = plate_readings(found, (fit,), found.body)
+    about = np.zeros(3)
+    one = validate(found.body, found.identified, kept, about=about, plates=(beside_table, plates))
+    plain = validate(found.body, found.identified, kept, about=about)
+    table, identified = beside_table.added(kept, found.body), plates.added(kept, found.identified)
+    np.testing.assert_allclose(one.table.value - plain.table.value, table, atol=1e-9)
+    np.testing.assert_allclose(one.identified.value - plain.identified.value, identified, atol=1e-9)
+    np.testing.assert_array_equal(one.measured.value, plain.measured.value)
+    assert np.linalg.norm(beside_table.size) > np.linalg.norm(plates.size)
+
+
+def test_of_plates_on_which_no_fitted_trial_stands_nothing_is_told() -> None:
+    def trial(name: str, role: str, **newton: float) -> Any:
+        plates = tuple(
+            SimpleNamespace(name=plate, wrench=SimpleNamespace(value=np.full((5, 6), value)))
+            for plate, value in newton.items()
+        )
+        return SimpleNamespace(name=name, trial=SimpleNamespace(role=role, plates=plates))
+
+    march, squats = trial("march", "fit", p1=700.0, p2=0.0), trial("squats", "validate", p1=650.0, p2=4.0)
+    walk = trial("walk", "validate", p1=700.0, p2=800.0)
+    assert _on_fitted_plates((march, squats, walk)) == {"march", "squats"}
 
 
 def test_the_rows_are_those_of_the_scores() -> None:

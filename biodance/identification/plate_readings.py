@@ -1,7 +1,7 @@
 """What the trials that were fitted tell of their plates: errors within the tolerances of installed ones (a millimetre,
 some milliradians, a few per mille of crosstalk, a newton of zero), most probable beside the identified body. Intervals
-count them; and since the same plates err alike in movement that was kept, they are taken off it before bodies are
-compared there.
+count them; and since the same plates err alike in movement that was kept, every body is compared there with what the
+fitted trials tell of the plates beside it.
 
 With X = [W E], E the errors of one standard deviation each, X' S^-1 (y - W phi) is X' S^-1 E z, with noise and wrong
 kinematics of the covariance of `mismatch`, and z ~ N(0, 1). At the identified phi, E[z | phi] is the mean that z would
@@ -49,10 +49,9 @@ class PlateReadings(Sendable):
         more = fit.doubts if fit.doubts.size else np.zeros((len(wrench), 6, len(self.size) - rows.shape[2]))
         return np.concatenate([rows, more], axis=2)
 
-    def taken_off(self, fit: Fit, body: Body) -> Fit:
-        """Return a trial of ``body`` as its plates would have recorded it without their errors."""
-        rows = self.rows(fit, body)
-        return replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - rows @ self.size))
+    def added(self, fit: Fit, body: Body) -> Array:
+        """Return (T, 6) N, N·m about the lab origin: what these errors add to what the plates read in a trial."""
+        return np.asarray(self.rows(fit, body) @ self.size)
 
     def told(self, fits: Sequence[Fit], body: Body) -> str:
         """Return in words what the plates read beside the ``body`` in the mean of some trials, with 95 % intervals; ""
@@ -70,8 +69,8 @@ class PlateReadings(Sendable):
         return ", ".join(sure)
 
 
-def plate_readings(found: Identification, fits: tuple[Fit, ...]) -> PlateReadings:
-    """Return what the trials that were fitted tell of their plates beside the body that was ``found``.
+def plate_readings(found: Identification, fits: tuple[Fit, ...], body: Body) -> PlateReadings:
+    """Return what the trials that were fitted tell of their plates beside a body.
 
     Parameters
     ----------
@@ -79,6 +78,8 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...]) -> PlateReading
         With its noise and the sizes of what disturbs it.
     fits : tuple of Fit
         The trials that it was identified from, at least one; each with the doubts of the corrections made in it.
+    body : Body
+        The identified one, or another in its place: the table's.
 
     Returns
     -------
@@ -86,18 +87,18 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...]) -> PlateReading
         Mean and covariance of the errors, the uncertainty of the parameters counted.
     """
     used, about, _ = usable(found.body, fits)
-    first = _readings(found, used, found.noise)
-    off = tuple(first.taken_off(fit, found.identified) for fit in used)
+    first = _readings(found, used, found.noise, body)
+    off = tuple(replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - first.added(fit, body))) for fit in used)
     left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
-    moments = left.moments(found.sip.phi, found.posterior.covariance)
-    return _readings(found, used, replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH)))
+    moments = left.moments(body.sip.phi, found.posterior.covariance)
+    return _readings(found, used, replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH)), body)
 
 
-def _readings(found: Identification, used: tuple[Fit, ...], noise: Noise) -> PlateReadings:
-    """Return what the ``used`` trials tell of their plates under a ``noise``."""
+def _readings(found: Identification, used: tuple[Fit, ...], noise: Noise, body: Body) -> PlateReadings:
+    """Return what the ``used`` trials tell of their plates under a ``noise``, beside a ``body``."""
     rows = mismatch(found.body, used, noise, with_rows=True).rows
     assert rows is not None
-    phi, H, sizes = found.sip.phi, rows.normal, found.sizes
+    phi, H, sizes = body.sip.phi, rows.normal, found.sizes
     half = inverse_root(sizes.noise * H + sizes.kinematics**2 * rows.kinematics @ rows.kinematics.T)
     of_body, of_plates = np.split(half @ H, [len(phi)], axis=1)
     after = np.linalg.inv(of_plates.T @ of_plates + np.eye(of_plates.shape[1]))

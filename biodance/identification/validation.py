@@ -14,6 +14,7 @@ from scipy.special import ndtri, stdtrit
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError
+from biodance.identification.plate_readings import PlateReadings
 from biodance.identification.statistics import Fit
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.records import Array, Wrench
@@ -101,9 +102,18 @@ class ResidualRatio:
         return min(self.force_interval[0], self.moment_interval[0]) > 1
 
 
-def validate(body: Body, identified: Body, fit: Fit, *, about: Array, mass: float | None = None) -> TrialValidation:
+def validate(
+    body: Body,
+    identified: Body,
+    fit: Fit,
+    *,
+    about: Array,
+    mass: float | None = None,
+    plates: tuple[PlateReadings, PlateReadings] | None = None,
+) -> TrialValidation:
     """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about
-    ``about`` (3,) m lab; ``mass`` kg on the plates, by default what was identified.
+    ``about`` (3,) m lab; ``mass`` kg on the plates, by default what was identified; ``plates`` what fitted trials tell
+    of their errors beside the one and the other, which its prediction holds.
 
     ``about``: the middle of the plates, or `standing_point` of the session; moments about the distant lab origin hide
     the differences.
@@ -113,9 +123,12 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array, mass: floa
     TrialRefused
         No frame of the trial may be compared.
     """
+    predicted = [predict_wrench(one, fit.motion).value for one in (body, identified)]
+    if plates is not None:
+        added = (told.added(fit, one) for told, one in zip(plates, (body, identified), strict=True))
+        predicted = [value + more for value, more in zip(predicted, added, strict=True)]
     measured, table, found = (
-        Wrench(wrench.time, wrench_about_point(wrench.value, about))
-        for wrench in (fit.wrench, predict_wrench(body, fit.motion), predict_wrench(identified, fit.motion))
+        Wrench(fit.wrench.time, wrench_about_point(value, about)) for value in (fit.wrench.value, *predicted)
     )
     return TrialValidation(
         fit.name,

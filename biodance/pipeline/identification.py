@@ -5,7 +5,7 @@ what it is worth on kept trials, an added load; and its quality table, a few num
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -31,7 +31,7 @@ from biodance.observations import recording
 from biodance.observations.stride_force import StrideForce
 from biodance.pipeline.trial_result import Check, TrialResult, WeighedBy, Weighing, trial_fit
 from biodance.records import ROLES, Role, Session, Sip, Subject
-from biodance.settings import CheckLimits
+from biodance.settings import TOUCH_FORCE, CheckLimits
 from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.plates import around_zero
 
@@ -209,9 +209,9 @@ def _median(found: list[tuple[str, float, float]], by: WeighedBy) -> Weighing | 
     return Weighing(mass, sd, by, tuple(dict.fromkeys(name for name, *_ in known)))
 
 
-TAKEN_OFF = (
-    "Within the tolerances of plates these read {} beside the body, in the mean of the trials that were fitted: taken "
-    "off the trials that were kept, before table and identified body are compared there."
+PLATES_READ = (
+    "Within the tolerances of plates these read {} beside the body, in the mean of the trials that were fitted. What "
+    "table and identified body predict of the kept trials on these plates holds what each of them leaves to the plates."
 )
 """What is said of plates whose errors the fitted trials tell."""
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
@@ -440,16 +440,17 @@ def predicted(
     found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
     parts = [fits_of_roles(results, roles, *corrections) for roles in (FITTED_ROLES, KEPT_ROLES)]
     about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
-    notes = list(one.notes)
-    if parts[1]:
-        beside = (one.posterior or one).identification  # both methods are compared on the same wrench
-        plates = plate_readings(beside, parts[0])
-        parts[1] = tuple(plates.taken_off(fit, beside.identified) for fit in parts[1])
-        told = plates.told(parts[0], beside.identified)
-        notes += [TAKEN_OFF.format(told)] * bool(told)
-    fitted, kept = (
-        tuple(validate(found.body, identified, fit, about=about, mass=mass) for fit in some) for some in parts
-    )
+    notes, on_same, plates = list(one.notes), _on_fitted_plates(results), None
+    if on_same.intersection(fit.name for fit in parts[1]):
+        beside, table = (one.posterior or one).identification, found.body.sip
+        share = (mass or table.mass.sum()) / table.mass.sum()
+        weighed_table = replace(found.body, sip=Sip(table.segments, share * table.phi, table.covariance))
+        of_table, own = (plate_readings(beside, parts[0], body) for body in (weighed_table, identified))
+        plates, told = (of_table, own), own.told(parts[0], identified)
+        notes += [PLATES_READ.format(told)] * bool(told)
+    judged = partial(validate, found.body, identified, about=about, mass=mass)
+    fitted = tuple(judged(fit) for fit in parts[0])
+    kept = tuple(judged(fit, plates=plates if fit.name in on_same else None) for fit in parts[1])
     if not kept:
         notes.append(
             "No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role "
@@ -465,6 +466,16 @@ def predicted(
         shown=_shown(results),
         notes=tuple(notes),
     )
+
+
+def _on_fitted_plates(results: tuple[TrialResult, ...]) -> frozenset[str]:
+    """Return the trials that stand on no other plates than those that were fitted: of others nothing was told."""
+    on = {
+        one.name: {p.name for p in one.trial.plates if (np.abs(p.wrench.value[:, 2]) > TOUCH_FORCE).any()}
+        for one in results
+    }
+    fitted = set[str]().union(*(on[one.name] for one in results if one.trial.role in FITTED_ROLES))
+    return frozenset(name for name, plates in on.items() if plates <= fitted)
 
 
 def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
