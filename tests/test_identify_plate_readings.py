@@ -53,7 +53,7 @@ def _told(seed: int, wrong: dict[str, float], doubt: float = 0.0) -> tuple[Ident
             for f in (fit, kept)
         )
     found = identify_body(body, (fit,))
-    return found, plate_readings(found, (fit,), found.identified), fit, kept
+    return found, *plate_readings(found, (fit,), found.identified), fit, kept
 
 
 def _left(fit: Fit, found: Identification, plates: PlateReadings | None = None) -> np.ndarray:
@@ -105,7 +105,8 @@ def test_what_is_left_of_a_correction_is_taken_off_too() -> None:
 def test_every_body_is_compared_with_what_the_plates_read_beside_it() -> None:
     """A wrong body leaves more to the plates, and is forgiven that: the gain is what is left of it then."""
     found, plates, fit, kept = _told(1, WRONG)
-    beside_table = plate_readings(found, (fit,), found.body)
+    beside_table, again = plate_readings(found, (fit,), found.body, found.identified)
+    np.testing.assert_array_equal(again.size, plates.size, "what one body is told hangs on who is asked beside it")
     about = np.zeros(3)
     one = validate(found.body, found.identified, kept, about=about, plates=(beside_table, plates))
     plain = validate(found.body, found.identified, kept, about=about)

@@ -18,7 +18,7 @@ from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.learning import START, WORTH
-from biodance.identification.mismatch import inverse_root, mismatch
+from biodance.identification.mismatch import PlateRows, inverse_root, mismatch
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Array, Wrench
@@ -69,35 +69,44 @@ class PlateReadings(Sendable):
         return ", ".join(sure)
 
 
-def plate_readings(found: Identification, fits: tuple[Fit, ...], body: Body) -> PlateReadings:
-    """Return what the trials that were fitted tell of their plates beside a body.
+def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) -> tuple[PlateReadings, ...]:
+    """Return what the trials that were fitted tell of their plates beside each of some bodies.
 
     Parameters
     ----------
     found : Identification
-        With its noise and the sizes of what disturbs it.
+        With its noise, the sizes of what disturbs it, and how sure its parameters are.
     fits : tuple of Fit
         The trials that it was identified from, at least one; each with the doubts of the corrections made in it.
-    body : Body
-        The identified one, or another in its place: the table's.
+    *bodies : Body
+        The identified one, and others in its place: the table's.
 
     Returns
     -------
-    PlateReadings
-        Mean and covariance of the errors, the uncertainty of the parameters counted.
+    tuple of PlateReadings
+        Mean and covariance of the errors beside each; the covariance counts how sure the identified parameters are.
     """
     used, about, _ = usable(found.body, fits)
-    first = _readings(found, used, found.noise, body)
-    off = tuple(replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - first.added(fit, body))) for fit in used)
-    left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
-    moments = left.moments(body.sip.phi, found.posterior.covariance)
-    return _readings(found, used, replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH)), body)
+    rows, told = _rows(found, used, found.noise), []
+    for body in bodies:
+        first = _readings(found, rows, body)
+        off = tuple(replace(f, wrench=Wrench(f.wrench.time, f.wrench.value - first.added(f, body))) for f in used)
+        left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
+        moments = left.moments(body.sip.phi, found.posterior.covariance)
+        noise = replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH))
+        told.append(_readings(found, _rows(found, used, noise), body))
+    return tuple(told)
 
 
-def _readings(found: Identification, used: tuple[Fit, ...], noise: Noise, body: Body) -> PlateReadings:
-    """Return what the ``used`` trials tell of their plates under a ``noise``, beside a ``body``."""
+def _rows(found: Identification, used: tuple[Fit, ...], noise: Noise) -> PlateRows:
+    """Return what the ``used`` trials tell of parameters and plates under a ``noise``, whatever the body."""
     rows = mismatch(found.body, used, noise, with_rows=True).rows
     assert rows is not None
+    return rows
+
+
+def _readings(found: Identification, rows: PlateRows, body: Body) -> PlateReadings:
+    """Return what the ``rows`` tell of the plates beside a ``body``."""
     phi, H, sizes = body.sip.phi, rows.normal, found.sizes
     half = inverse_root(sizes.noise * H + sizes.kinematics**2 * rows.kinematics @ rows.kinematics.T)
     of_body, of_plates = np.split(half @ H, [len(phi)], axis=1)
@@ -105,4 +114,4 @@ def _readings(found: Identification, used: tuple[Fit, ...], noise: Noise, body: 
     gain = after @ of_plates.T
     slope = gain @ of_body
     covariance = after + slope @ found.posterior.covariance @ slope.T
-    return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, layout_for(noise.about))
+    return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, layout_for(found.noise.about))

@@ -210,7 +210,8 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
 def _own_tolerances(search: Search, effects: Sequence[Effect]) -> NDArray[np.intp]:
     """Return the columns that are tolerances of ``effects`` of which twice the size is not twice the change: the
     tolerance is written for sizes near none, and a cause of the opposite size beside it would be a filter of the
-    forces. The slab of the cause, three times as wide at least, stands for both.
+    forces. The slab of the cause, three times as wide at least, stands for both. A tolerance that was turned together
+    with others stays: a plate turns by a degree, which is nearly in proportion.
     """
     curved = [one for one in effects if not one.linear]
     found = (search.rows.tolerated.get((one.name, one.target), (slice(0),))[0] for one in curved)

@@ -445,7 +445,7 @@ def predicted(
         beside, table = (one.posterior or one).identification, found.body.sip
         share = (mass or table.mass.sum()) / table.mass.sum()
         weighed_table = replace(found.body, sip=Sip(table.segments, share * table.phi, table.covariance))
-        of_table, own = (plate_readings(beside, parts[0], body) for body in (weighed_table, identified))
+        of_table, own = plate_readings(beside, parts[0], weighed_table, identified)
         plates, told = (of_table, own), own.told(parts[0], identified)
         notes += [PLATES_READ.format(told)] * bool(told)
     judged = partial(validate, found.body, identified, about=about, mass=mass)

@@ -115,10 +115,11 @@ def session_tables(
 
     Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles``
     (deg by frame; empty where not determined), ``angle_states`` (when an angle is filled or not determined), ``wrench``
-    (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin); with an
-    identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known; empty where the posture
-    is not determined) and ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``; with a
-    movement those of `movement_tables`. A table without rows has its columns all the same.
+    (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin; what plates are known
+    to read is in neither); with an identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are
+    known; empty where the posture is not determined) and ``validation``; with a diagnosis ``findings``,
+    ``unobservable`` and ``adequacy``; with a movement those of `movement_tables`. A table without rows has its columns
+    all the same.
     """
     found = result.identification
     tables = {
