@@ -103,5 +103,7 @@ def test_the_postures_of_a_real_person_foretell_his_squats(kept: str, data: Path
     assert result.identification is not None
     (one,) = result.identification.validations
     table, found = one.table_agreement.rms, one.identified_agreement.rms
-    assert np.all(found[3:5] < 0.6 * table[3:5])
+    # The table has its own plates' readings beside it: without them it misses these moments by 13 and 17 N·m.
+    assert np.all(found[3:5] < (2 / 3) * table[3:5])
+    assert np.all(found[3:5] < (5.1, 8.3))
     assert np.all(found[:3] < 1.1 * table[:3])
