@@ -212,7 +212,8 @@ class Scaling:
         q = _static_posture(body, frames)
         limits, widened = widen_limits(body, q)
         body = replace(body, limits=limits, notes=(*body.notes, *widened))
-        return _widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
+        held = _widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q)
+        return replace(held, marked_in=q), q
 
 
 def measure_static(subject: Subject, static: Trial) -> Scaling:
