@@ -121,9 +121,7 @@ class Inferred:
             if len(unit) != 1 or not unit.size or one.names in named:
                 continue
             (parameter,), value = one.effect.parameters, float(unit[0] @ best.coefficients[where])
-            turn, own = best.columns.turn[where], np.zeros(best.fit.u.size)
-            own[: turn.shape[1]] = unit[0] @ turn * best.fit.size[: turn.shape[1]]
-            sd = np.hypot(max(best.fit.variance(own) ** 0.5, parameter.alike), one.effect.size_error * value)
+            sd = np.hypot(max(best.variance(where, unit[0]) ** 0.5, parameter.alike), one.effect.size_error * value)
             size = Estimate(parameter.name, value, float(sd), unit_at(parameter.unit, one.effect.target))
             if size.known and matters(one.effect, np.array([value])):
                 out.append(Finding(*one.names, (size,), (), 1.0, kind=one.effect))
@@ -368,7 +366,7 @@ def _visible(one: NamedCause, rows: Rows, best: Hypothesis) -> float:
     """Return the share of a cause that is left when all that is no fault may adapt."""
     if one.course or not one.covariance.size:
         return 1.0
-    slope = rows.slopes(one.effect, one.theta)[:, 0]
+    slope = rows.slopes(one.effect, one.theta)[:, 0].copy()
     slope[: rows.plates] *= np.exp(-best.fit.scales.noise)
     known = 1 / max(one.covariance[0, 0], 1e-300) - 1 / (3 * one.effect.typical[0]) ** 2
     return float(np.sqrt(np.clip(known / max(float(slope @ slope), 1e-300), 0.0, 1.0)))

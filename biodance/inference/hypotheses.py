@@ -89,6 +89,16 @@ class Hypothesis:
             size[0] += share @ self.phi
         return size
 
+    def variance(self, where: slice, unit: Array) -> float:
+        """Return the posterior variance of ``unit`` (k,) times the coefficients of `Rows.X` ``where``, all of one
+        group. In directions that the rows do not show they keep the variance of the prior.
+        """
+        seen, own = unit @ self.columns.turn[where], np.zeros(self.fit.u.size)
+        own[: seen.size] = seen * self.fit.size[: seen.size]
+        (group,) = {*self.rows.group[where]}
+        scale = float(np.exp(2 * self.fit.scales.groups[group])) if group >= 0 else 1.0
+        return self.fit.variance(own) + float(unit @ unit - seen @ seen) * scale
+
     def whole_covariance(self, one: NamedCause) -> Array:
         """Return the covariance (p, p) of the size of a cause, with what of the first parameter lies in the body: the
         sum is better known than either.

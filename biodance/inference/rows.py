@@ -124,6 +124,7 @@ class Rows:
             simulated = self.white(slopes(self.problem, effect, theta, of=effect.removed))
         found = np.concatenate([simulated, self.observed(effect)])
         if effect.linear:
+            found.setflags(write=False)  # all who ask share it
             self._slopes[effect] = found
         return found
 
