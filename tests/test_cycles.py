@@ -137,6 +137,18 @@ def test_contact_and_flight_are_told_where_the_other_foot_strikes_after_this_one
     assert "double_support" not in one.values
 
 
+def test_double_support_is_not_told_where_a_foot_s_own_lift_is_unknown():
+    moved, _ = walk()
+    soles, centre = soles_from_body(BODY, moved), centre_of_mass(BODY, moved)
+    steps = [(1.0, "right", True), (1.1, "left", False), (1.5, "left", True), (1.6, "right", False)]
+    for known in (True, False):
+        events = tuple(FootEvent(*one) for one in (*(steps if known else steps[:-1]), (2.0, "right", True)))
+        cycles = [one for one in gait_cycles("walk", events) if one.side == "right"]
+        (one,) = strides(tuple(cycles), events, BODY, soles, centre)
+        assert np.isfinite(one.cycle.off) == known
+        assert one.values.get("double_support") == (pytest.approx(20.0) if known else None)
+
+
 def test_on_a_treadmill_the_belt_s_way_is_walked():
     moved, _ = walk(belt=SPEED)
     events = kinematic_events(BODY, moved)

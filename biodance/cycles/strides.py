@@ -158,7 +158,7 @@ def _values(
         values["step_length"] = float(across @ along)
         to_right = float(across[0] * along[1] - across[1] * along[0])
         values["step_width"] = to_right if cycle.side == "right" else -to_right
-    double = other_off - cycle.start + max(0.0, cycle.off - other_strike)
+    double = other_off - cycle.start + float(np.maximum(cycle.off - other_strike, 0.0))  # unknown where either is
     return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
 
 

@@ -60,7 +60,7 @@ _ODD_FEET = 6.0
 
 @dataclass(frozen=True)
 class Limits:
-    """How exact a pose must be (95 %): ``across`` and ``along`` m, the better and the worse known horizontal direction;
+    """How exact a pose must be (90 %): ``across`` and ``along`` m, the better and the worse known horizontal direction;
     ``yaw`` rad; ``delay`` s.
     """
 

@@ -342,7 +342,7 @@ def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> Found
 
 
 def _sway(lacks: Array, vertical: Array, period: float, lever: float) -> Array:
-    """Return by how much (N, 2) m the forces must aim elsewhere to give the angular momentum that ``lacks`` (N, 3)."""
+    """Return by how much (N, 2) m the forces must aim elsewhere to take off the angular momentum ``lacks`` (N, 3)."""
     spectrum = np.fft.rfft(lacks[:, :2], axis=0)
     spectrum *= 2j * np.pi * np.fft.rfftfreq(len(lacks), period / len(lacks))[:, None]
     rate = np.fft.irfft(spectrum, len(lacks), axis=0)
