@@ -65,6 +65,7 @@ def innovation(body: Body, one: RobotMotion) -> float:
     motion = one.fit.motion.at(pick)
     W = regressor(body, motion)
     left = one.fit.wrench.value[pick] - W @ body.sip.phi
+    # var(W phi) per channel, plus the start of the noise.
     allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(robot_start(body))
     return float(np.sqrt(np.mean(left**2 / allowed)))
 
@@ -100,6 +101,7 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
         found = estimate_base(total.information(noise), base)
         phi[list(base.columns)] = found.value
         left = total.moments(phi, np.zeros((phi.size, phi.size))).residual[0]
+        # Of count samples with six channels the base parameters take rank degrees of freedom, rank / 6 per channel.
         noise = replace(noise, covariance=np.diag(np.diag(left) / (total.count[0] - found.rank / 6))[None])
     return found
 
@@ -197,6 +199,7 @@ def loads(body: Body, one: Grounded, measured: Array) -> Loads:
     torque[:, joints] = every[:, joints]
     size = np.sqrt(np.mean(torque**2, axis=0))
     left = np.cross([0.0, 0.0, 1.0], ahead)
+    # Moment about the sole's own axes: about its left axis it rocks forwards, about the one ahead sideways.
     give = [-np.einsum("ti,ti->t", pressed, axis) for axis in (left, ahead)]
     moment = np.sqrt(np.mean(np.square(give), axis=1))
     play = -np.tanh(torque / np.maximum(_TURNS * size, 1e-9))
@@ -236,6 +239,8 @@ def _needed(body: Body, motion: Motion) -> Array:
         row[:] = pin.rnea(model, data, q, v, a)[:6]
     turn = quaternion_matrix(motion.q[:, 3:7])
     force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (rows[:, :3], rows[:, 3:]))
+    # RNEA's first six are the root's wrench in its own axes about its origin: turned, then
+    # carried to the lab origin.
     return np.concatenate([force, moment + cross(motion.q[:, :3], force)], axis=1)
 
 
@@ -251,6 +256,7 @@ def place_changes(wrench: Array, one: Grounded, pick: "slice | np.ndarray" = sli
     force, moment = wrench[:, :3], wrench[:, 3:]
     whole = np.zeros((len(wrench), 6, 3))
     for k in range(2):
+        # Shift d of the frame: moment d x F. Turn by a small yaw: z x F, z x M.
         whole[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
     up = YAW * np.eye(3)[2]
     whole[:, :3, 2], whole[:, 3:, 2] = cross(up, force), cross(up, moment)
