@@ -171,6 +171,7 @@ def search(problem: MarkerProblem, frames: Index) -> Minimum:
     )
     known = np.zeros(0, dtype=np.intp)
     for stride in _STRIDES:
+        # Coarse frames first, the last one always; those between start from what is solved around them.
         level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
         if not known.size:
             found = from_markers(problem, frames[level], SHARES if count > _SHORT else (*SHARES, *MORE_SHARES))
