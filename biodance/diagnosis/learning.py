@@ -72,6 +72,7 @@ def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 
 def _beside(start: Tolerances, worth: float, learned: Tolerances, count: int) -> Tolerances:
     """Return what ``count`` sessions say beside what ``worth`` sessions said before: mean squares."""
     share = worth / (worth + count)
+    # Mean squares, not deviations, are averaged by their worth in sessions.
     sizes = {
         key: float(np.sqrt((1 - share) * size**2 + share * start.size(key) ** 2)) for key, size in learned.sizes.items()
     }
@@ -87,6 +88,7 @@ def shown_by(nulls: Iterable[Null], found: Tolerances) -> dict[str, float]:
         some = _posterior(null, found)
         for key, variance in zip(null.keys, some.variance, strict=True):
             if key and np.isfinite(variance):
+                # Share of the size's variance that the session took off.
                 count[key] = count.get(key, 0.0) + max(0.0, 1 - float(variance) / found.size(key) ** 2)
     return count
 
@@ -136,10 +138,12 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
             if row[0] and np.isfinite(row[2])
         ]
         wrench = 6 * null.band.size
+        # E[r²]: square of the residual at the mean plus the posterior variance.
         seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
         rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
         parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
         here = moments_of(parts, null.band, bands)
+        # Noise is stated for the reference person.
         total = total + replace(here, residual=here.residual * (REFERENCE_PERSON / null.mass) ** 2)
     means, sizes = sizes_of(rows)
     learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
