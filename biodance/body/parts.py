@@ -389,6 +389,7 @@ def turn_inertia(lump: RigidInertia, rotation: Array) -> RigidInertia:
 def mirror_inertia(lump: RigidInertia) -> RigidInertia:
     """Return the lump of the other body side: reflected at the plane z = 0."""
     flip = np.diag([1.0, 1.0, -1.0])
+    # Quadratic in the places, so F I F holds for a reflection, too.
     return RigidInertia(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
 
 

@@ -287,6 +287,7 @@ def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | Non
         raise FileRefused(f"{path}: {what} has a mass of {value:g} kg; it must not be negative.")
     xx, xy, xz, yy, yz, zz = (_number(path, tensor, key, what) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     turn, com = placement(path, inertial, what)
+    # From the axes of the inertial to those of the link, about the centre of mass.
     inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     return RigidInertia(value, com, inertia) if value > 0 else None
 
@@ -359,6 +360,7 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     if mimic is not None:
         offset = _number(path, mimic, "offset", what) if mimic.get("offset") else 0.0
         slide, turn = (offset, 0.0) if kind == "prismatic" else (0.0, offset)
+        # At rest of the joint that it copies: turned, or moved along its axis, by the offset.
         held = rotation @ axis_rotation(axis, np.array([turn]))[0]
         place = translation + slide * rotation @ axis
         return replace(fixed, rotation=held, translation=place, axis=axis, frozen="mimic")

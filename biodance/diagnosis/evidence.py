@@ -100,6 +100,7 @@ def evidence(s: Array, G: Array, length: float) -> Evidence:
     """
     inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
     mean = inner @ s
+    # log Bayes factor of unit-normal coefficients: 1/2 s'(1 + G)^-1 s - 1/2 log|1 + G|.
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
     return Evidence(value, mean, inner, visible(G, length))
 

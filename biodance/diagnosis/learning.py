@@ -111,14 +111,18 @@ def _posterior(null: Null, found: Tolerances) -> _Posterior:
     size = np.array([1.0 if key == "" else found.size(key) for key in null.keys])
     expected = np.array([found.mean(name) if name else 0.0 for name in null.mean_keys or null.keys])
     known = np.flatnonzero(size > 0)
+    # Coefficients of unit variance: columns times the sizes, less what is expected.
     scaled = null.columns[:, known] * size[known].astype(null.columns.dtype)
     target = null.target - shown_left_out(null.columns[:, known] @ expected[known], null.marker_keys)
     X = whitened(scaled, null.band, null.marker_keys, null.mass, found)
     y = whitened(target[:, None].astype(X.dtype), null.band, null.marker_keys, null.mass, found)[:, 0]
+    # A = X'X + 1: data and unit-normal prior.
     factor = cho_factor((X.T @ X).astype(float) + np.eye(known.size), lower=True)
     mean, covariance = cho_solve(factor, (X.T @ y).astype(float)), cho_solve(factor, np.eye(known.size))
     value, variance = np.full((2, size.size), np.nan)
+    # Back to the units of the coefficients.
     value[known], variance[known] = expected[known] + size[known] * mean, size[known] ** 2 * np.diag(covariance)
+    # scaled @ chol(covariance): a root of what the coefficients leave uncertain in the rows.
     return _Posterior(
         value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype)
     )

@@ -137,6 +137,7 @@ class WrenchWatch:
         if len(self.before) < _LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
         W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
+        # What the body leaves, and what no body may leave less of.
         return np.asarray((wrench - W @ posterior.mean).var(axis=0)) + (_SMALLEST_JUMP * self.weight / 2) ** 2
 
 

@@ -156,6 +156,7 @@ def known_together(sip: Sip) -> tuple[Together, ...]:
         if not set(names) <= set(sip.segments):
             continue
         at = [10 * sip.segments.index(name) for name in names]
+        # Variance of a sum: the sum of all elements; the trace, if nothing were shared.
         cov = np.asarray(sip.covariance)[np.ix_(at, at)]
         sd, alone = float(np.sqrt(max(cov.sum(), 0.0))), float(np.sqrt(np.trace(cov)))
         if sd < alone:

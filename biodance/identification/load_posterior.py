@@ -44,6 +44,7 @@ class LoadPosterior:
     @property
     def sd(self) -> float:
         """Standard deviation of the load, kg."""
+        # E[m²] - E[m]².
         return float(np.sqrt(max(float(self.weight @ MASSES**2) - self.mass**2, 0.0)))
 
     @property

@@ -179,6 +179,7 @@ def _nearest(posterior: BodyPosterior, limits: _Limits, bound: NDArray[np.intp])
     solver stops, it is asked again in units of the distance to the prior.
     """
     rows = (10 * bound[:, None] + np.arange(10)).ravel()
+    # The least |x| has no part that the bound segments do not see: x = Q z.
     span = np.linalg.qr(posterior.factor[rows].T)[0]
     local, mean = posterior.factor[rows] @ span, posterior.mean[rows]
     far = float(np.linalg.norm(np.linalg.lstsq(local, posterior.prior.phi[rows] - mean)[0]))

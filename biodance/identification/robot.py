@@ -124,6 +124,7 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
             motion = fit.motion.at(pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
+            # Sum over frames and channels of W' S^-1 times what each error changes.
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))
             faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
             place += np.tensordot(weight, place_changes(wrench, one.grounded, pick), axes=((0, 1), (0, 1)))
@@ -278,6 +279,7 @@ def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, 
         foot = body.feet[side]
         middle = foot.outline.mean(axis=0)
         soles.append(pose.rotation[:, foot.segment] @ middle + pose.position[:, foot.segment])
+        # Lab x as the foot sees it at rest, turned with the foot, seen from above.
         ahead = pose.rotation[:, foot.segment] @ (rest.rotation[0, foot.segment].T @ [1.0, 0.0, 0.0])
         flat = ahead * [1.0, 1.0, 0.0]
         aheads.append(flat / np.linalg.norm(flat, axis=1, keepdims=True))
@@ -292,5 +294,6 @@ def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, 
     names = [body.segments[body.feet[side].segment] for side in SIDES]
     torque = joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
     standing = np.arange(len(down))
+    # About the middle of each sole.
     pressed = [wrench_about_point(part.value, sole)[:, 3:] for part, sole in zip(parts, soles, strict=True)]
     return torque, np.array(pressed)[one.foot, standing], np.array(aheads)[one.foot, standing]

@@ -27,6 +27,7 @@ def energies(one: Hypothesis) -> tuple[Array, Array]:
     n = one.rows.plates
     left = one.left[:n]
     count = np.bincount(one.rows.block[:n]).astype(float)
+    # exp(2 noise): factor on the variance of the noise.
     loud = np.exp(2 * one.fit.scales.noise)
     return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
 

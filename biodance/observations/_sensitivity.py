@@ -58,6 +58,7 @@ def of_mean(wrench: Array, channel: int, weights: Array | None = None) -> Array:
     """
     out = np.zeros((6, 7))
     mean = wrench.mean(axis=0) if weights is None else weights @ wrench
+    # d(mean of channel i) / dB_ij: mean of w_j, and 1 for the constant.
     out[channel] = np.append(mean, 1.0 if weights is None else weights.sum())
     return out
 

@@ -109,6 +109,7 @@ def _beyond(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
     left = {error.joint: error.centre for error in calibrated}
     out = np.zeros((len(sip.phi), len(sip.phi)))
     for i, segment in enumerate(sip.segments):
+        # Independent errors: only the variance beyond what is counted already.
         more = left.get(_joint_of(segment), 0.0) ** 2 - _centre_size(segment, set(left)) ** 2
         cut = slice(10 * i, 10 * i + 10)
         slope = np.sqrt(max(more, 0.0)) * shift_slope(sip.phi[cut])

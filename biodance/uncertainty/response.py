@@ -150,7 +150,7 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, _, size = weight.shape
         flat, value = weight.reshape(frames, -1), np.zeros((frames, 9 * size))
-        second.add_transposed(self.motion.rate**2, flat, value[:, : 6 * size])
+        second.add_transposed(self.motion.rate**2, flat, value[:, : 6 * size])  # transposes of F2, then F1
         first.add_transposed(self.motion.rate, flat[:, 3 * size :], value[:, 6 * size :])
         back = value.reshape(frames, 9, size)
         back[:, :3] += skew(self.body.gravity).T @ weight[:, 3:]

@@ -161,6 +161,7 @@ def prior(
     if opinions:
         apart = wider * primitive_covariance(lumps, skeleton, (), least=least)
         lumps, covariance = _weigh(lumps, covariance, apart, opinions)
+    # J C J', J block diagonal: from mass, centre and inertia about it to the ten parameters.
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)

@@ -249,6 +249,7 @@ def _foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, _SegmentOp
     opinions = {}
     for side in SIDES:
         area = _area(subject.foot_outline[side], subject.sex) / _area(usual, subject.sex)
+        # As the volume: area of the sole times height of the ankle, against those of the usual foot.
         mass = mean * people["mass_kg"][subject.sex] * area * skeleton.ankle_height[side] / height
         opinions[f"{side}_foot"] = _SegmentOpinion(mass, float(own * mass), ("foot outline",))
     return opinions

@@ -351,6 +351,7 @@ def _static_posture(body: Body, frames: SegmentFrames) -> Array:
         chain = [i for i, joint in enumerate(body.joints) if joint.name.rsplit("_", 1)[0] == group]
         first, last = body.joints[chain[0]], body.joints[chain[-1]]
         above = body.segments[body.joints[first.parent].segment if first.parent >= 0 else 0]
+        # joint_R_child: from the parent's pose, the frame of the joint and the child's pose.
         relative = first.rotation.T @ frames.rotation[above].T @ frames.rotation[body.segments[last.segment]]
         q[7 + np.array(chain)] = chain_angles(relative, np.array([body.joints[i].axis for i in chain]))
     return q

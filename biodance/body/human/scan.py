@@ -404,6 +404,7 @@ def _lump(part: Array, kind: str, origin: Array, up: Array) -> RigidInertia:
     y = up / np.linalg.norm(up)
     x = np.cross(y, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
+    # Rows are the axes: frame is own_R_scan.
     frame = np.stack([x, y, np.cross(x, y)])
     found = mass_properties(part - origin, density=_density(kind)) if len(part) else None
     if found is None or found.volume <= 0:

@@ -134,6 +134,7 @@ def _shoulder_centres(place: _Places, sizes: measures.Measures, mid_hip: Array) 
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
         up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
         ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
+        # Part of ahead across up.
         forward = measures.unit(np.cross(np.cross(up, ahead), up))
     else:
         up = (right + left) / 2 - mid_hip

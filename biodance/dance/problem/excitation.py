@@ -125,6 +125,7 @@ def criteria(blocks: Blocks, grams: Array) -> Array:
     whole = [i for i, pick in enumerate(blocks.first) if len(pick) == 3 and blocks.weight[i] > 0]
     if whole:
         least, most = extremes(grams[:, whole])
+        # cond(W) is the root of that of W'W.
         out += np.sqrt(most / np.maximum(least, 1e-12)) @ blocks.weight[whole]
     for i, pick in enumerate(blocks.first):
         if 0 < len(pick) < 3 and blocks.weight[i] > 0:

@@ -118,6 +118,7 @@ class RowCovariance:
         """Return q and r (V, A) of the rows' ``shares`` (n, A) in each visit: c' V^-1 c = sum q - h (sum r)^2 for a
         column c that has these shares in some visits of one person, and zeros elsewhere.
         """
+        # By visit: 1'D^-1 c and c'D^-1 c; the visit's own g takes g (1'D^-1 c)² off.
         white = self.groups.by_visit @ (shares / self.alone[:, None])
         own = self.groups.by_visit @ (shares**2 / self.alone[:, None])
         return own - self._visits_less[:, None] * white**2, self.groups.by_visit @ (shares * self.ones[:, None])
@@ -140,6 +141,7 @@ class Projection:
     def __init__(self, rows: RowCovariance, columns: Array) -> None:
         self.rows, self.columns, self.solved = rows, columns, rows.solve(columns)
         known = columns.T @ self.solved
+        # A trace of each own diagonal element: positive definite where columns nearly agree.
         self._factor = cho_factor(known + np.diag(_RIDGE * np.diag(known) + np.finfo(float).tiny), lower=True)
 
     @cached_property
@@ -149,10 +151,12 @@ class Projection:
 
     def fit(self, value: Array) -> Array:
         """Return the coefficients (K, m) of generalised least squares of ``value`` (n, m)."""
+        # beta = (X'V^-1 X)^-1 X'V^-1 y.
         return np.asarray(cho_solve(self._factor, self.solved.T @ value))
 
     def left(self, value: Array) -> tuple[Array, Array]:
         """Return P y (n, m) and y' P y (m,) of ``value`` y (n, m), from what generalised least squares leave of it."""
+        # P y = V^-1 (y - X beta), and y'P y = (y - X beta)'V^-1 (y - X beta).
         rest = value - self.columns @ self.fit(value)
         weighted = self.rows.solve(rest)
         return weighted, np.einsum("ij,ij->j", rest, weighted)

@@ -196,6 +196,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     zeroed = [_zeroed(value, time) for value in turned]
     signed = [_upright(value) for value, _, _ in zeroed]
     total = np.sum([value for value, _ in signed], axis=0)
+    # The place is told by the total: which foot is on which plate does not matter.
     shift = None if feet is None else _shift(total, time, feet)
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
         return PlatesRead(warnings=(_lacking([n for n, _ in free], feet, shift),))

@@ -92,6 +92,7 @@ def _normal(jacobian: Array, weight: Array) -> Array:
 
 def _open(normal: Array) -> NDArray[np.bool_]:
     """Return (nv,) the coordinates that take part in a change of posture that the markers hardly see."""
+    # Eigenvectors of small eigenvalues: changes that hardly move a marker.
     value, vector = np.linalg.eigh(normal)
     return (np.abs(vector[:, value < _LEAST_MOTION**2]) > 0.2).any(axis=1)
 

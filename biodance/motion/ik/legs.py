@@ -63,6 +63,7 @@ class Leg:
 
     def _length_terms(self) -> tuple[float, float, float]:
         """Return a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee)."""
+        # |thigh + K R shank|², K'thigh = (x, y, z), shank = (u, v, w), R a turn by the knee about -z.
         x, y, z = self.knee_turn.T @ self.thigh
         u, v, w = self.shank
         constant = self.thigh @ self.thigh + self.shank @ self.shank + 2 * w * z

@@ -226,6 +226,7 @@ def _posture_of(chain, smooth, near, single, q):
     groups = chain.ball.shape[0]
     for b in range(groups):
         x, y, z, w = smooth[c + b], smooth[c + groups + b], smooth[c + 2 * groups + b], smooth[c + 3 * groups + b]
+        # Parts of a quaternion lie a number of balls apart: x of all, y of all ...
         over, j = 1 / np.sqrt(x * x + y * y + z * z + w * w), chain.ball[b]
         turn = (x * over, y * over, z * over, w * over)
         place = slice(first + j, first + j + 3)

@@ -168,7 +168,7 @@ def add_up(chain, xyz, weight, q, at):
         pz = o[2] + R[2, 0] * local[0] + R[2, 1] * local[1] + R[2, 2] * local[2]
         mx, my, mz = xyz[k, 0] - x, xyz[k, 1] - y, xyz[k, 2] - z
         cost += 0.5 * w * ((px - mx) ** 2 + (py - my) ** 2 + (pz - mz) ** 2)
-        px, py, pz = w * px, w * py, w * pz
+        px, py, pz = w * px, w * py, w * pz  # below: sums of w, w p, w m and, row by row, w p m'
         T[0] += w
         T[1], T[2], T[3] = T[1] + px, T[2] + py, T[3] + pz
         T[4], T[5], T[6] = T[4] + w * mx, T[5] + w * my, T[6] + w * mz
