@@ -87,6 +87,7 @@ def build(
             )
         )
     for carrier, parameters in inertias:
+        # The ten parameters are about the joint, as Pinocchio's dynamic parameters are.
         inertia = pin.Inertia.FromDynamicParameters(np.array(parameters))
         model.appendBodyToJoint(root if carrier < 0 else ids[carrier], inertia, pin.SE3.Identity())
     return model
@@ -257,6 +258,7 @@ class Body(JointTree, Sendable):
         """Upright posture, (nq,): zero joint angles, root at the lab origin, facing lab x."""
         q = np.zeros(self.nq)
         if self.n_root:
+            # A quarter turn about x: quaternion (sin 45°, 0, 0, cos 45°) in the order x, y, z, w.
             q[3:7] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2.0)
         return q
 

@@ -27,6 +27,7 @@ def place_at_zero(body: Body, joint: int) -> tuple[Array, Array]:
     turn, place = np.eye(3), np.zeros(3)
     while joint >= 0:
         one = body.joints[joint]
+        # From the joint inwards: each frame is written in its parent's until the root is reached.
         turn, place, joint = one.rotation @ turn, one.translation + one.rotation @ place, one.parent
     return turn, place
 
@@ -44,21 +45,25 @@ def written_in(body: Body, segment: int, turn: Array, shift: Array) -> Body:
         for joint in body.joints
     )
     ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
+    # Matter in the new frame: x_new = turn' (x_old - shift).
     table[ten, ten] = shift_matter(-turn.T @ shift, turn.T)
     feet = {
         side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot
         for side, foot in body.feet.items()
     }
     on = (np.array(body.markers.segment, dtype=int) == segment)[:, None]
+    # Rows times turn are turn' applied to each place.
     place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
     boxes, com_boxes = np.array(body.boxes), np.array(body.com_boxes)
     for some in (boxes, com_boxes):
         low, high = some[segment] - shift
+        # A box in turned axes: the smallest one around its eight corners.
         corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
         some[segment] = (corners @ turn).min(axis=0), (corners @ turn).max(axis=0)
     return replace(
         body,
         joints=joints,
+        # phi -> T phi, covariance -> T C T'.
         sip=Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T),
         markers=replace(body.markers, position=place),
         boxes=boxes,
@@ -78,6 +83,7 @@ def recentre_joint(body: Body, joint: int, shift: Array) -> Body:
     """Return the body whose ``joint`` turns about a point ``shift`` (3,) m away (in its parent's frame), while in the
     neutral posture matter, markers and all other joints stay where they are.
     """
+    # child_R_parent of the neutral posture: the joint's shift in the child's axes.
     segment, back = carried_by(body, joint), -neutral_turn(body, joint) @ np.asarray(shift)
     return written_in(move_joint(body, joint, shift), segment, np.eye(3), -back)
 
@@ -102,6 +108,7 @@ def neutral_turn(body: Body, joint: int) -> Array:
     while joint != last:
         joint = next(i for i, other in enumerate(body.joints) if other.parent == joint)
         turn = turn @ body.joints[joint].rotation
+    # turn is parent_R_child along the chain; transposed child_R_parent.
     return np.asarray(turn.T)
 
 
@@ -162,6 +169,7 @@ def with_part(body: Body, cut: Cut) -> Body:
     segment, the last one. A part that takes no matter takes a ten-thousandth.
     """
     segment, phi = body.segment_index(cut.segment), cut.phi
+    # In the part's own frame (origin at its joint), per kilogram of the whole.
     share = shift_matter(-cut.place) @ phi / body.sip.phi[10 * segment]
     if not phi.any():
         share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), _GYRATION**2 * np.eye(3)))
@@ -197,6 +205,7 @@ def parts_as_segments(body: Body) -> Body:
         whole, own = boxes[part.segment], np.zeros((2, 3))
         if part.share[0] > _TRACE:
             low, high = np.array(whole), np.array(whole)
+            # Along the segment's y axis the joint's height divides the box between part and rest.
             low[1, 1] = high[0, 1] = np.clip(origin[1], *whole[:, 1])
             own, boxes[part.segment] = (high, low) if part.share[2] > 0 else (low, high)
             own = own - origin
@@ -221,11 +230,15 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
     if smallest_eigenvalues(phi[rows[0]])[0] > 0:
         return
     own = moved @ phi[rows[1]]
+    # Of W = rest + part, V and E^1/2 with W = V E V': in these units the whole is 1.
     value, vector = np.linalg.eigh(pseudo_inertia(phi[rows[0]] + own)[0])
     root = np.sqrt(np.maximum(value, _FLAT * value[-1]))
+    # Share of the part in each direction: W^-1/2 P W^-1/2.
     share = (vector / root).T @ pseudo_inertia(own)[0] @ (vector / root)
     level, axes = np.linalg.eigh(share)
+    # Limited to `_MOST` in each of its own directions, and back to units of mass.
     less = (vector * root) @ (axes * np.minimum(level, _MOST)) @ axes.T @ (vector * root).T
+    # Ten parameters from a symmetric 4 x 4 matrix that the map can make: exact.
     left = np.linalg.lstsq(PSEUDO_INERTIA, less.ravel(), rcond=None)[0]
     phi[rows[0]] += own - left
     phi[rows[1]] = np.linalg.solve(moved, left)
@@ -238,6 +251,7 @@ def _room_for(body: Body, cut: Cut) -> Body:
     for k, part in enumerate(body.parts):
         first = _first_joint(body, body.segment_joint[count + k])
         moved = Part(part.name, count, part.share / gone)
+        # The share was per kilogram of the whole: its whole has now this share of the old mass.
         stays = Part(part.name, part.segment, part.share / (1 - gone))
         cut_here = body.segments[part.segment] == cut.segment
         parts.append(moved if first in cut.joints else stays if cut_here else part)
@@ -284,11 +298,14 @@ def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
     rest, part, split = whole - cut.phi, np.zeros((10, 10)), np.zeros(10)
     if cut.phi[0] > _GRAM:
         share = cut.phi[0] / whole[0]
+        # Splits in proportion to the mass, so that part @ whole = cut.phi at the table's whole.
         part = share * np.eye(10) + np.outer(cut.phi - share * whole, np.eye(10)[0]) / whole[0]
         split = _SPLIT * (cut.phi if cut.phi[0] < rest[0] else rest)
     spread = np.eye(body.sip.phi.size + 10, body.sip.phi.size)
+    # Covariance of [rest, part] = [1 - part, part] times that of the whole.
     spread[old, old], spread[-10:, old] = np.eye(10) - part, moved @ part
     across = np.zeros(len(spread))
+    # What the cut itself leaves unsure goes from one side to the other: opposite signs.
     across[old], across[-10:] = -split, moved @ split
     phi = np.concatenate([body.sip.phi, moved @ cut.phi])
     phi[old] = rest

@@ -231,6 +231,8 @@ class JointTree:
         table = np.eye(count + 10 * len(self.parts), count)
         for k, part in enumerate(self.parts):
             mass, rest = 10 * part.segment, slice(10 * part.segment, 10 * part.segment + 10)
+            # Links = table times segments: the part has its share of the mass, and its matter
+            # is taken from the rest.
             table[count + 10 * k : count + 10 * k + 10, mass] = part.share
             _, origin = self.place_on_segment(self.segment_joint[len(self.segments) + k])
             table[rest, mass] -= shift_matter(origin) @ part.share
@@ -304,6 +306,7 @@ def combine_inertias(*lumps: RigidInertia) -> RigidInertia:
     """Return several lumps given in one frame as one rigid lump."""
     mass = sum(lump.mass for lump in lumps)
     com = sum((lump.mass * lump.com for lump in lumps), np.zeros(3)) / mass
+    # Parallel axes to the common CoM.
     inertia = sum((lump.inertia + lump.mass * _steiner(lump.com - com) for lump in lumps), np.zeros((3, 3)))
     return RigidInertia(mass, com, inertia)
 
@@ -315,6 +318,7 @@ def _steiner(arm: Array) -> Array:
 
 def stretch_inertia(lump: RigidInertia, times: Array) -> RigidInertia:
     """Return the lump with its matter stretched by ``times`` (3,) along the axes of its frame, from the origin."""
+    # Central second moments S = tr(I)/2 1 - I become D S D; the mass is the same.
     moments = times[:, None] * (0.5 * np.trace(lump.inertia) * np.eye(3) - lump.inertia) * times
     return RigidInertia(lump.mass, times * lump.com, np.trace(moments) * np.eye(3) - moments)
 
@@ -346,6 +350,7 @@ def _pseudo_inertia_map() -> Array:
     for column, (i, j) in enumerate(TENSOR, start=4):
         if i == j:
             for axis in range(3):
+                # tr(I)/2 1 - I: the moment I_ii counts + 1/2 on the other two axes, - 1/2 on its own.
                 M[axis, axis, column] += 0.5 if axis != i else -0.5
         else:
             M[i, j, column] = M[j, i, column] = -1.0
@@ -362,6 +367,7 @@ def shift_matter(shift: Array, turn: Array | None = None) -> Array:
     """
     move = np.eye(4)
     move[:3, :3], move[:3, 3] = np.eye(3) if turn is None else turn, shift
+    # J' = M J M' with the homogeneous move M: (M kron M) on the 16 elements, back to ten parameters.
     return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
 
 
@@ -383,6 +389,7 @@ def turn_inertia(lump: RigidInertia, rotation: Array) -> RigidInertia:
 def mirror_inertia(lump: RigidInertia) -> RigidInertia:
     """Return the lump of the other body side: reflected at the plane z = 0."""
     flip = np.diag([1.0, 1.0, -1.0])
+    # Quadratic in the places, so F I F holds for a reflection, too.
     return RigidInertia(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
 
 
@@ -390,10 +397,12 @@ def parameter_jacobian(lump: RigidInertia) -> Array:
     """Return d phi / d [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (10, 10) at a lump."""
     mass, com = lump.mass, lump.com
     out = np.zeros((10, 10))
+    # At constant c and J per mass all ten are in proportion to the mass.
     out[:, 0] = inertial_parameters(lump) / mass
     out[1:4, 1:4] = mass * np.eye(3)
     for row, (i, j) in enumerate(TENSOR, start=4):
         for k in range(3):
+            # d(|c|² 1 - c c')_ij / dc_k.
             shift = 2 * com[k] * (i == j) - com[i] * (j == k) - com[j] * (i == k)
             out[row, 1 + k] = mass * shift
     out[4:, 4:] = mass * np.eye(6)

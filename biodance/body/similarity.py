@@ -51,6 +51,7 @@ def standing_frames(body: Body) -> Body:
                 f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the "
                 "feet must be flat within 30 degrees. Give the joints zeros at which the robot stands."
             )
+        # Gram-Schmidt: forwards square to the sole.
         ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
         ahead /= np.linalg.norm(ahead)
         axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)
@@ -61,6 +62,7 @@ def standing_frames(body: Body) -> Body:
 def sole_normal(foot: parts.Foot) -> Array:
     """Return the unit normal (3,) of a flat sole upwards, in the frame of the foot."""
     edges = foot.outline - foot.outline.mean(axis=0)
+    # Sum of cross products round the outline: twice its area vector, upwards if counter-clockwise.
     normal = np.cross(edges, np.roll(edges, -1, axis=0)).sum(axis=0)
     return np.asarray(normal / np.linalg.norm(normal))
 
@@ -77,6 +79,7 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
         return body
     joints, joint = list(body.joints), body.joints[carrier]
     place = joint.translation + joint.rotation @ shift
+    # The joint's angle turns before the segment's new axes: its axis is written in them.
     joints[carrier] = replace(joint, rotation=joint.rotation @ turn, translation=place, axis=turn.T @ joint.axis)
     return replace(body, joints=tuple(joints))
 
@@ -90,6 +93,7 @@ def _ankle(body: Body, segment: int) -> Array:
     origin, across = -last.rotation.T @ last.translation, np.cross(last.axis, before)
     if across @ across < 1e-6:
         return np.zeros(3)
+    # Nearest point to a second axis: (origin x before).(a x before) / |a x before|² along the own one.
     return np.asarray((np.cross(origin, before) @ across / (across @ across)) * last.axis)
 
 
@@ -109,6 +113,7 @@ class SimilarityScale:
 def similar_body(body: Body, to: SimilarityScale) -> Body:
     """Return the body of the same shape with lengths, masses, strengths and speeds changed by the factors of ``to``."""
     length, mass, limits = to.length, to.mass, body.limits
+    # Mass, first moments, inertia: M, M L, M L².
     units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
     return replace(
         body,
@@ -139,6 +144,7 @@ def robot_covariance(lumps: list[parts.RigidInertia], com_sd: list[float]) -> Ar
     """Return the covariance (10N, 10N) of the parameters of independent segments, ``com_sd`` (N) m per axis."""
     out = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, (lump, com) in enumerate(zip(lumps, com_sd, strict=True)):
+        # A third of the trace: mean moment, per mass.
         size = _RELATIVE_INERTIA_SD * np.trace(lump.inertia) / lump.mass / 3
         jacobian, block = parts.parameter_jacobian(lump), slice(10 * i, 10 * i + 10)
         sd = np.diag([_RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6])
@@ -148,6 +154,7 @@ def robot_covariance(lumps: list[parts.RigidInertia], com_sd: list[float]) -> Ar
 
 def is_point(lump: parts.RigidInertia) -> bool:
     """Whether a lump has no extension: its radius of gyration is below `POINT`."""
+    # tr(I) = 2 m k² with the radius of gyration k about the CoM.
     return bool(np.trace(lump.inertia) <= 2 * lump.mass * POINT**2)
 
 
@@ -159,12 +166,14 @@ def extended(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
 def solid(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
     """Return a body of uniform density that fills a ``box`` (2, 3) m, with the lump's mass and centre of mass."""
     square = np.square(box[1] - box[0])
+    # m / 12 (b² + c²) with full edges.
     return parts.RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
 
 
 def is_possible(lump: parts.RigidInertia) -> bool:
     """Whether some body has this mass, centre and inertia."""
     moments = np.linalg.eigvalsh(lump.inertia)
+    # Triangle inequality: the largest moment at most the sum of the others.
     return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -_ROUNDING * moments[-1])
 
 

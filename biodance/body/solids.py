@@ -33,6 +33,7 @@ def box_solid(box: Array) -> "Trimesh":
     from trimesh.creation import icosphere
 
     sphere = icosphere(subdivisions=3)
+    # On the superellipsoid sum |x|^p = 1: divided by the p-norm.
     size = (np.abs(sphere.vertices) ** ROUNDNESS).sum(axis=1, keepdims=True) ** (1 / ROUNDNESS)
     low, high = np.asarray(box)
     sphere.vertices = (low + high) / 2 + (high - low) / 2 * sphere.vertices / size

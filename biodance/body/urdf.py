@@ -130,6 +130,7 @@ def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_C
     while waiting:
         c = waiting.pop(0)
         (turn, place), above = frame[c.parent], owner[c.parent]
+        # Parent's frame times the joint's own placement.
         turn, place = turn @ c.rotation, place + turn @ c.translation
         if c.kind == "fixed":
             owner[c.child], frame[c.child] = above, (turn, place)
@@ -147,6 +148,7 @@ def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_C
     for name, link in file.links.items():
         (turn, place), carrier = frame[name], owner[name]
         if link.lump is not None:
+            # Lump in the carrier's frame: turned, then moved.
             turned = parts.turn_inertia(link.lump, turn)
             carrier.lumps.append(replace(turned, com=turned.com + place))
         carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
@@ -180,6 +182,7 @@ def _box(carrier: _Carrier, lump: parts.RigidInertia) -> Array:
     if corners.size:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
     moments = np.diag(lump.inertia)
+    # Of a solid box with half edge a: tr(I) - 2 I_x = 2 m a² / 3.
     half = np.sqrt(np.maximum(1.5 * (moments.sum() - 2 * moments) / lump.mass, 1e-6))
     return np.stack([lump.com - half, lump.com + half])
 

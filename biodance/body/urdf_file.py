@@ -125,9 +125,11 @@ def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
     normals = hull.equations[:, :3]
     edges = points[hull.simplices]
     area = np.linalg.norm(np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0]), axis=1) / 2
+    # Faces whose normals lie within 2 degrees are one face of a meshed sole.
     alike = normals @ normals.T > np.cos(np.radians(2.0))
     face = np.where(-normals @ up > _STEEPEST, alike @ area, 0.0)
     best = int(np.argmax(face))
+    # Mean normal, weighted with the areas.
     mean = (alike[best] * area) @ normals
     return np.asarray(mean / np.linalg.norm(mean)) if face[best] > 0 else np.asarray(normals[np.argmax(-normals @ up)])
 
@@ -143,6 +145,7 @@ def _largest(flat: Array, outline: list[int]) -> list[int]:
     """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): the least important go first."""
     while len(outline) > CORNERS:
         here, before, after = flat[outline], flat[np.roll(outline, 1)], flat[np.roll(outline, -1)]
+        # Twice the area of the triangle that a corner makes with its neighbours: what the sole loses without it.
         (ax, ay), (bx, by) = (here - before).T, (after - before).T
         outline.pop(int(np.argmin(np.abs(ax * by - ay * bx))))
     return outline
@@ -253,6 +256,7 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
     if origin is None:
         return np.eye(3), np.zeros(3)
     roll, pitch, yaw = _row(path, origin, "rpy", what, "0 0 0")
+    # rpy: about fixed x, y, z in this order, so Rz Ry Rx.
     turn = elementary_rotation("z", yaw) @ elementary_rotation("y", pitch) @ elementary_rotation("x", roll)
     return turn, _row(path, origin, "xyz", what, "0 0 0")
 
@@ -283,6 +287,7 @@ def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | Non
         raise FileRefused(f"{path}: {what} has a mass of {value:g} kg; it must not be negative.")
     xx, xy, xz, yy, yz, zz = (_number(path, tensor, key, what) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     turn, com = placement(path, inertial, what)
+    # From the axes of the inertial to those of the link, about the centre of mass.
     inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     return RigidInertia(value, com, inertia) if value > 0 else None
 
@@ -355,6 +360,7 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     if mimic is not None:
         offset = _number(path, mimic, "offset", what) if mimic.get("offset") else 0.0
         slide, turn = (offset, 0.0) if kind == "prismatic" else (0.0, offset)
+        # At rest of the joint that it copies: turned, or moved along its axis, by the offset.
         held = rotation @ axis_rotation(axis, np.array([turn]))[0]
         place = translation + slide * rotation @ axis
         return replace(fixed, rotation=held, translation=place, axis=axis, frozen="mimic")

@@ -84,6 +84,7 @@ def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[An
         if ours.size < _FEWEST:
             continue
         moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
+        # The correlation of an angle that does not move is noise.
         correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
         apart, label = ours - other, f"{label} {'xyz'[axis]}"
         mean, sd = float(apart.mean()), float(apart.std())
@@ -116,7 +117,9 @@ def file_curves(cycle: Cycle, outputs: FileOutputs, time: Array, ours: Sequence[
     for quantity, (label, axis) in _PLUG_IN_GAIT.items():
         theirs = outputs.angles.get(f"{cycle.side[:1].upper()}{label}")
         if theirs is not None and len(theirs) == time.size:
+            # Wrapped to [-180, 180).
             found.append(over_cycle(cycle, quantity, cycle.side, "deg", time, (theirs[:, axis] + 180) % 360 - 180))
+    # Mean over the cycle of theirs less ours.
     turned = [[one.value for one in some if one.quantity == "pelvis_rotation"] for some in (ours, found)]
     oblique = not all(turned) or not abs(np.nanmean(turned[1][0] - turned[0][0])) < _OBLIQUE
     yield from (one for one in found if not (oblique and _PLUG_IN_GAIT[one.quantity][0] in _AGAINST_LAB))

@@ -86,8 +86,10 @@ def mean_and_sd(values: Array) -> tuple[Array, Array]:
     """Return mean and standard deviation (101,) over the rows (n, 101) that are known; NaN for fewer than one, two."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
+    # Zeros where not known, so the sum is over what is known; the count says of how many.
     mean = np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
     square = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    # Sample variance: n - 1.
     return mean, np.where(count > 1, np.sqrt(square / np.maximum(count - 1, 1)), np.nan)
 
 
@@ -135,10 +137,13 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     motion = _only(motion, cycle.frames(motion.time))
     pose, time = poses(body, motion.q), motion.time
     x, y = direction_of(cycle, pose, time)
+    # Rows: ahead, up, right of the way, the axes of the pelvis and foot when they are not turned.
     frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
     middle, mirror = "middle" if cycle.side == "both" else cycle.side, -1.0 if cycle.side == "left" else 1.0
     known = np.where(motion.determined, 1.0, np.nan)
     rotation = frame @ pose.rotation[:, 0]
+    # R = Ry(t) Rx(o) Rz(l), turn t, over o, tilt l: the third column is (sin t cos o, -sin o, cos t cos o), the
+    # second row begins with cos o sin l, cos o cos l.
     turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
     over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
     tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
@@ -150,11 +155,14 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
         yield over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
     for side in SIDES:
         if cycle.side in (side, "both"):
+            # z axis of the foot; its first angle is that of Ry again.
             across = frame @ pose.rotation[:, body.sip.segments.index(f"{side}_foot"), :, 2, None]
             inwards = np.degrees(np.arctan2(across[:, 0, 0], across[:, 2, 0])) * (-1.0 if side == "left" else 1.0)
             yield over_cycle(cycle, "foot_progression", side, "deg", time, known * inwards)
     centre = centre_of_mass(body, motion)
+    # Zero is the place at the start, and the ground in height.
     began = place_at(centre, time, cycle.start) * np.array([1.0, 1.0, 0.0])
+    # Fifth percentile: single frames below the ground do not count.
     ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
     for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
         path = sign * ((centre - began) @ frame[axis]) - zero
@@ -194,23 +202,30 @@ def load_curves(
     near = (motion.time >= cycle.start - _BEYOND) & (motion.time <= cycle.end + _BEYOND)
     motion, known = _only(motion, near), known[near]
     ground = {
+        # A wrench that is not known is zero here and its values become NaN below.
         f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))
         for foot, side in enumerate(SIDES)
     }
     names, rows, given = _moments_and_powers(body, motion, ground)
     own = [(k, seen) for k, (joint, _) in enumerate(names) if (seen := _seen_from(cycle, joint)) is not None]
+    # No sharing: the parameters are those of the segments themselves.
     columns, share = [k for k, _ in own], np.eye(sip.phi.size) if body.sharing is None else body.sharing
     rows, given, mass = rows[:, columns], given[:, columns], float(sip.mass.sum())
+    # phi_links = S phi: covariance S C S'.
     variance, covariance = np.empty(given.shape), share @ sip.covariance @ share.T
     for column in range(len(columns)):  # of the links beyond the joint alone: no other parameter moves it
         beyond = np.flatnonzero(rows[:, column].any(axis=0))
+        # Columns that are zero at all times need no covariance.
         needs = rows[:, column, beyond]
+        # y'C y of every frame.
         variance[:, column] = np.sum((needs @ covariance[np.ix_(beyond, beyond)]) * needs, axis=-1)
+    # (Y phi - c) / m.
     value, sd = (rows @ (share @ sip.phi) - given) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
     for column, (k, (side, joint, sign)) in enumerate(own):
         kind = names[k][1]
         of_leg = joint.startswith(("hip", "knee", "ankle"))  # which needs its own foot, trunk and arms nothing
         use = motion.determined & (known[:, SIDES.index(side)] if of_leg else True)
+        # The sign of an angle turns its moment, not the power, the product of moment and rate.
         shown, sign = np.where(use, 1.0, np.nan), sign if kind == "moment" else 1.0
         unit = "N·m/kg" if kind == "moment" else "W/kg"
         curves = sign * shown * value[:, column], shown * sd[:, column]
@@ -225,6 +240,7 @@ def _moments_and_powers(
     """Return joint, kind ("moment", "power"), rows (T, m, 10N) and given (T, m): value = rows phi - given."""
     regressor, given = torque_regressor_of_links(body, motion), ground_torques(body, motion, ground)
     rates, groups = motion.v[:, body.n_root :], [list(chain) for chain in chains(body)]
+    # Power = sum over the joint's axes of v_j tau_j = (v'Y) phi - v'c.
     rows = [np.einsum("tj,tjp->tp", rates[:, axes], regressor[:, axes]) for axes in groups]
     work = [np.sum(rates[:, axes] * given[:, axes], axis=1) for axes in groups]
     names = [(joint.name, "moment") for joint in body.joints]
@@ -253,8 +269,10 @@ def ground_curves(
     wrench, weight = feet[f"{cycle.side}_foot"].value[part], STANDARD_GRAVITY * float(body.sip.mass.sum())
     time, told = motion.time[part], known[part, foot]
     x, y = direction_of(cycle, poses(body, motion.q[part]), time)
+    # % of the weight; exactly zero after the foot has left.
     carries = np.where(time > cycle.off, 0.0, 100 / weight)
     shown = np.where(told, carries, np.nan)
+    # [y, -x] is to the right of the way.
     inwards = -outwards * (wrench[:, :2] @ [y, -x])
     for name, force in (("forward", wrench[:, :2] @ [x, y]), ("inward", inwards), ("up", wrench[:, 2])):
         yield over_cycle(cycle, f"ground_reaction_{name}", cycle.side, "%", time, shown * force)
@@ -273,4 +291,5 @@ def _on_sole(body: Body, outline: Array, foot: int, wrench: Array, *, threshold:
     height = outline[:, foot, :, 2].min(axis=1)
     from_heel = zero_moment_point(wrench, height=height, threshold=threshold)[:, :2] - heel
     ahead = np.einsum("tk,tk->t", from_heel, along)
+    # Cross product: (along_y, -along_x) is to the right.
     return ahead, from_heel[:, 0] * along[:, 1] - from_heel[:, 1] * along[:, 0]

@@ -37,6 +37,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
     events = []
     for foot, side in enumerate(SIDES):
         wrench = feet[f"{side}_foot"]
+        # Over the same plate at the same time.
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
         shortest = _SHORTEST * wrench.rate
@@ -44,6 +45,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):
                 continue
+            # Straight line between the two frames; clipped, since shorter contacts were filled in.
             share = (FORCE_DOWN - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
             events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
@@ -53,6 +55,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
 def _without_short(loaded: Mask, shortest: float) -> Mask:
     """Return ``loaded`` (T,) without gaps and contacts shorter than ``shortest`` frames; the ends stay."""
     kept = loaded.copy()
+    # Gaps first, then contacts: a flicker joins the contact that it interrupts.
     for value in (False, True):
         for start, stop in runs(kept == value):
             if stop - start < shortest and start > 0 and stop < len(kept):
@@ -82,8 +85,10 @@ def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
     """
     outline, pose = soles_from_body(body, motion).outline, poses(body, motion.q)
     forward = pose.rotation[:, 0, :2, 0]
+    # Horizontal part of the pelvis' x axis.
     forward = forward / np.linalg.norm(forward, axis=1, keepdims=True)
     places = (place[..., :2] - pose.position[:, :1, :2] for place in heel_and_toe(body, outline))
+    # (place of the foot - place of the pelvis) · forward.
     heel, toe = (np.einsum("tfk,tk->tf", place, forward) for place in places)  # m ahead of the pelvis, (T, 2)
     least = _SWING * _thigh_and_shank(body)
     if motion.time.size < 0.5 * motion.rate or not np.ptp(heel[:, 0] - heel[:, 1]) > least:
@@ -99,6 +104,7 @@ def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
 def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
     """Return the backmost and the foremost part (T, 2, 3) m of the soles (T, 2, P, 3) m, right foot first."""
     heel, toe = np.empty((2, len(outline), 2, 3))
+    # Tenths of the length of the sole at either end.
     for foot, side in enumerate(SIDES):
         length = body.feet[side].outline[:, 0]
         reach = length.max() - length.min()
@@ -138,6 +144,7 @@ def replaced_events(found: tuple[FootEvent, ...], said: tuple[FootEvent, ...]) -
 def _thigh_and_shank(body: Body) -> float:
     """Return the length, m, of thigh and shank together, mean of both legs."""
     ends = ("knee_flexion", "ankle_dorsiflexion")
+    # Both legs are summed: half of it is the mean.
     return float(sum(np.linalg.norm(one.translation) for one in body.joints if one.name.endswith(ends))) / 2
 
 
@@ -147,10 +154,14 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
 
     rate = motion.rate
     if rate > 2.5 * _EVENT_CUTOFF:
+        # Forwards and backwards: no delay.
         path = sosfiltfilt(butter(2, _EVENT_CUTOFF, fs=rate, output="sos"), path, padlen=min(20, path.size - 1))
     speed = np.gradient(path, motion.time)
+    # A foot on the ground goes backwards under the pelvis: the median of the negative speeds.
     ground = float(np.median(speed[speed < 0]))
+    # A strike is a top of the heel's path, a leaving the lowest point of the toes'.
     tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
+    # From the strike on in time, from the leaving back: to where the foot has the ground's speed.
     step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
     times = []
     for top in tops[motion.determined[tops]]:
@@ -158,6 +169,7 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
         while 0 < here < path.size - 1 and speed[here] > level:
             here += step
         before = here - step
+        # Where the speed passes the level, linearly between two frames.
         share = (speed[before] - level) / (speed[before] - speed[here]) if speed[here] <= level else 1.0
         times.append(float(motion.time[before] + step * share / rate))
     return times
@@ -214,6 +226,7 @@ class Cycle:
 
     def frames(self, time: Array) -> slice:
         """Return those of the frames at ``time`` (T,) s that its curves hang on: one more on either side."""
+        # searchsorted on the right gives the first frame after: one before it, one after the end.
         first, last = np.searchsorted(time, (self.start, self.end), side="right")
         return slice(max(int(first) - 1, 0), int(last) + 1)
 
@@ -250,10 +263,12 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     mass `_SEATED` behind the heels sits on something: a rise begins with the centre of mass moving and ends standing.
     """
     height, time = poses(body, motion.q).position[:, 0, 2], motion.time
+    # Percentile: a jump of a marker is no height.
     top, centre = float(np.percentile(height, 98)), centre_of_mass(body, motion)
     seated, cycles = _seated(body, soles, centre), list[Cycle]()
     for first, stop in runs(height < top - _DEEP * _thigh_and_shank(body)):
         lowest = first + int(np.argmin(height[first:stop]))
+        # Within `_UP` of the depth from the top: before and after this dip.
         up = np.flatnonzero(height >= top - _UP * (top - height[lowest]))
         before, after = up[up < first], up[up >= stop]
         if not after.size or not motion.determined[first : after[0] + 1].all():
@@ -269,6 +284,7 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
             cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
         elif before.size:
             cycles.append(Cycle(trial, "squat", "both", *time[[before[-1], after[0], lowest]].tolist()))
+    # Each overlaps itself: one that overlaps another has no standing between.
     return tuple(one for one in cycles if sum(map(one.overlaps, cycles)) == 1)
 
 
@@ -277,5 +293,6 @@ def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
     ahead = (toe - heel).mean(axis=1)
     ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    # The smaller of both feet: behind both heels.
     behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
     return np.asarray(behind > _SEATED)

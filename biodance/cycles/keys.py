@@ -147,6 +147,7 @@ def _of_ground(one: CycleCurve) -> Iterator[KeyValue]:
         found = {"maximum": high}
     else:
         found = {"first_peak": stance[first], "valley": valley, "second_peak": stance[second]}
+    # The reading is proportional to the gain: its sd is a share of the value.
     gain = error_size(GAIN.name, "Fz" if one.quantity == "ground_reaction_up" else "Fx")
     yield from (_key(one, key, float(value), sd=gain * abs(float(value))) for key, value in found.items())
 

@@ -60,6 +60,7 @@ def lift(
         later = np.minimum(at + _OVER, at[-1])
         if sure[inside].all():
             values["share_right"] = float(100 * right.sum() / total.sum())
+        # Largest gain over `_OVER` s from any instant; near the end the window is shorter, its divisor is not.
         values["force_rise"] = float(100 * ((np.interp(later, at, total) - total) / _OVER).max() / weight)
     return Stride(cycle, values)
 
@@ -98,6 +99,7 @@ def jumps(
 
     height, time = centre[:, 2], motion.time
     sole, near = soles.outline[..., 2].min(axis=2), max(1, round(_NEAR * motion.rate))
+    # `_RISES` on either side of a top.
     tops, _ = find_peaks(height, prominence=_RISES)
     flights = [flight for top in tops if (flight := _flight(sole, int(top), near, motion.determined)) is not None]
     found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= _SHORTEST]
@@ -115,13 +117,17 @@ def _flight(sole: Array, top: int, near: int, determined: Mask) -> tuple[int, in
     """
     before, after = sole[max(0, top - near) : top + 1], sole[top : top + near]
     ground = np.stack([before.min(axis=0), after.min(axis=0)])
+    # Both soles are clear of the ground, and it is as high before as after.
     if not (sole[top] > ground + _CLEAR).all() or np.abs(ground[1] - ground[0]).max() > _CLEAR:
         return None
+    # Backwards from the top: the last frame in which each foot is at the ground.
     left = [top - int(np.argmax((before[:, foot] < ground[0, foot] + _LEAVES)[::-1])) for foot in (0, 1)]
     down = [top + int(np.argmax(after[:, foot] < ground[1, foot] + _LEAVES)) for foot in (0, 1)]
     first, last = max(left), min(down)
+    # `near` frames are `_NEAR` s: `_TOGETHER` s in frames.
     if not determined[first : last + 1].all() or first - min(left) > near * _TOGETHER / _NEAR:
         return None
+    # Since when at least one foot has been on the ground: a flight before it is another one.
     above = np.flatnonzero((sole[:first] > ground[0] + _LEAVES).all(axis=1))
     return (int(above[-1]) + 1 if above.size else 0), first, last
 
@@ -129,9 +135,11 @@ def _flight(sole: Array, top: int, near: int, determined: Mask) -> tuple[int, in
 def _cycle(trial: str, time: Array, height: Array, flight: tuple[int, int, int]) -> Cycle:
     """Return the jump with a ``flight`` (`_flight`)."""
     landed, off, down = flight
+    # From the last sinking frame before take-off: all after it is the push.
     sinks = np.flatnonzero(np.diff(height[landed : off + 1]) < 0)
     lowest = landed + (int(sinks[-1]) + 1 if sinks.size else 0)  # where the last rise before the take-off begins
     way = height[landed : lowest + 1].max() - height[lowest]
+    # The last frame that is within `_UP` of the way down from its top.
     high = np.flatnonzero(height[landed : lowest + 1] >= height[lowest] + (1 - _UP) * way)
     return Cycle(trial, "jump", "both", float(time[landed + high[-1]]), float(time[down]), float(time[off]))
 

@@ -84,6 +84,7 @@ def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...
     bands = []
     for name, row in raw.items():
         kind, quantity = name.split(" ")
+        # Written in steps: straight lines between them.
         mean, sd = (
             np.interp(PERCENT, PERCENT[::_WRITTEN_EVERY], np.asarray(row[key], dtype=float)) for key in ("mean", "sd")
         )
@@ -127,6 +128,7 @@ class DeviationReference:
 
     def index(self, vector: Array) -> float:
         """Return the index of a gait vector (459,) deg: 100 healthy, every 10 less one standard deviation."""
+        # z of the log distance; ten points per standard deviation.
         return 100.0 - 10.0 * (float(np.log(_distance(self.basis, self.control, vector))) - self.mean) / self.sd
 
 
@@ -157,6 +159,7 @@ def deviation_reference(strides: Array, healthy: Array, *, features: int = FEATU
             f"A gait deviation index needs at least {features} strides and two healthy legs; there are {len(strides)} "
             f"and {len(healthy)}. Measure more people."
         )
+    # Rows of V': the right singular vectors are directions in the space of gait vectors.
     basis = np.linalg.svd(strides, full_matrices=False)[2][:features]
     control = (healthy @ basis.T).mean(axis=0)
     distance = np.log([_distance(basis, control, one) for one in healthy])
@@ -215,6 +218,7 @@ def gait_scores(
     if not set(SCORE_ANGLES) <= set(bands) or not vectors:
         return None
     usual = np.stack([bands[name].mean[::_EVERY] for name in SCORE_ANGLES])
+    # Root mean square over the instants of the cycle (axis 1), one for each angle.
     profile = {
         cycle: np.sqrt(np.mean((vector.reshape(usual.shape) - usual) ** 2, axis=1)) for cycle, vector in vectors.items()
     }
@@ -223,6 +227,7 @@ def gait_scores(
     variables = _known_spreads(
         {(name, side): rows[:, k] for side, rows in seen.items() for k, name in enumerate(SCORE_ANGLES)}
     )
+    # Root mean square of the nine, cycle by cycle.
     gps = _known_spreads({side: np.sqrt(np.mean(rows**2, axis=1)) for side, rows in seen.items()})
     index = {cycle: deviation.index(one) for cycle, one in vectors.items()} if deviation is not None else {}
     gdi = _known_spreads({side: [value for cycle, value in index.items() if cycle.side == side] for side in seen})
@@ -245,4 +250,5 @@ def _overall(seen: Mapping[str, Array]) -> float:
     if set(seen) != set(SIDES):
         return float("nan")
     right, left = (seen[side].mean(axis=0) for side in SIDES)
+    # Nine of the left side and six of the right one: the pelvis' three belong to both.
     return float(np.sqrt(np.mean(np.concatenate([left, right[_PELVIS:]]) ** 2)))

@@ -60,8 +60,10 @@ def strides(
     for one in (one for one in cycles if one.kind == "gait"):
         other_off, other_strike = _other_foot(one, events)
         own, first, last = heel[:, SIDES.index(one.side)], *(one.start + p / 100 * one.duration for p in _FLAT)
+        # While it stands the foot goes as the ground does: on a belt backwards.
         ground = (place_at(own, soles.time, last) - place_at(own, soles.time, first)) / (last - first)
         ground = ground if np.linalg.norm(ground) > _BELT else np.zeros(2)  # m/s of what the foot stands on
+        # Way of the heel relative to the ground.
         stride = place_at(own, soles.time, one.end) - place_at(own, soles.time, one.start) - ground * one.duration
         values = _values(one, other_off, other_strike, heel, soles.time, ground, stride)
         values |= _margins(one, other_off, other_strike, own, soles, centre, velocity - ground, stride)
@@ -78,7 +80,9 @@ def vertical_stiffness(mass: float, contact: float, flight: float) -> float:
     ``contact`` s and in the air for ``flight`` s: a half sine of force, over the way that the body goes down in it
     (Morin et al. 2005, doi:10.1123/jab.21.2.167).
     """
+    # Impulse over a step: mean force = m g (1 + flight / contact), and a half sine has 2/pi of its peak as its mean.
     largest = mass * STANDARD_GRAVITY * np.pi / 2 * (flight / contact + 1)
+    # F sin(pi t / T) / m - g, integrated twice over half the contact to the middle, where the body is lowest.
     down = largest * contact**2 / (mass * np.pi**2) - STANDARD_GRAVITY * contact**2 / 8
     return float(largest / down)
 
@@ -106,11 +110,14 @@ def _margins(
     if not stands.any() or not np.linalg.norm(stride) > 0:
         return {}
     along = stride / np.linalg.norm(stride)
+    # (along_y, -along_x) is to the right.
     outwards = np.array([along[1], -along[0]]) * (1.0 if cycle.side == "right" else -1.0)
     from_heel = centre[stands] - np.column_stack([heel[stands], soles.outline[stands, foot, :, 2].min(axis=1)])
+    # 1 / omega of the inverted pendulum: root(l / g).
     pendulum = np.sqrt(np.linalg.norm(from_heel, axis=1).mean() / STANDARD_GRAVITY)
     near = cycle.frames(time)
     beyond = centre[near, :2] + pendulum * velocity[near]
+    # Farthest part of the sole along each way, less the extrapolated centre.
     aside, ahead = ((soles.outline[near, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
     margins = {"margin_ahead": float(np.interp(cycle.start, time[near], ahead))}
     single = (time[near] >= other_off) & (time[near] <= other_strike)
@@ -143,6 +150,7 @@ def _values(
 ) -> dict[str, float]:
     foot, length = SIDES.index(cycle.side), float(np.linalg.norm(stride))
     values = {
+        # Two steps in a stride, 60 s in a minute.
         "cadence": 120.0 / cycle.duration,
         "speed": length / cycle.duration,
         "stride_length": length,
@@ -152,12 +160,15 @@ def _values(
         values["stance"] = cycle.off_percent
     if np.isfinite(other_strike) and length > 0:
         across = place_at(heel[:, foot], time, cycle.end) - place_at(heel[:, 1 - foot], time, other_strike)
+        # The ground has moved on since the other foot's strike.
         across -= ground * (cycle.end - other_strike)
         along = stride / length
         values["step_time"] = cycle.end - other_strike
         values["step_length"] = float(across @ along)
+        # Cross product with the direction of the stride.
         to_right = float(across[0] * along[1] - across[1] * along[0])
         values["step_width"] = to_right if cycle.side == "right" else -to_right
+    # Both feet stand from this strike to the other's leaving, and from the other's strike to this leaving.
     double = other_off - cycle.start + float(np.maximum(cycle.off - other_strike, 0.0))  # unknown where either is
     return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
 

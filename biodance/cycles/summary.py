@@ -193,6 +193,7 @@ def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue]) -> KeySummary
     right, left = (spread(sides[side]) for side in SIDES)
     first, difference, ci95, symmetry = some[0], float("nan"), None, float("nan")
     if right and left:
+        # Right less left: from the left mean to the right one.
         change = change_of_mean(visit_mean(sides["left"]), visit_mean(sides["right"]))
         difference, ci95 = change.value, change.interval
         symmetry = symmetry_index(right.mean, left.mean) if first.unit != "deg" or first.key == "range" else np.nan
@@ -234,6 +235,7 @@ def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
     """Return the gait cycles during which the pelvis turns."""
     curves = [one for trial in trials for one in trial.curves if one.quantity == "pelvis_rotation"]
     known = [(one.cycle, one.value[np.isfinite(one.value)]) for one in curves if one.cycle.kind == "gait"]
+    # Wrapped: a turn through 180 degrees is no jump.
     return [cycle for cycle, way in known if way.size and abs((way[-1] - way[0] + 180) % 360 - 180) > _TURNS]
 
 
@@ -243,6 +245,7 @@ def _spikes(same: Sequence[CycleCurve]) -> list[CycleCurve]:
         return []
     values = np.stack([one.value for one in same])
     known = np.isfinite(values).any(axis=0)
+    # Largest distance over the cycle to the median curve of all.
     apart = np.nan_to_num(np.abs(values[:, known] - np.nanmedian(values[:, known], axis=0))).max(axis=1, initial=0.0)
     far = max(_LEAST[same[0].unit], _FAR * float(np.median(apart)))
     return [one for one, size in zip(same, apart, strict=True) if size > far]

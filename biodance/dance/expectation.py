@@ -74,6 +74,7 @@ def _deviations(posterior: BodyPosterior) -> Array:
     for first in range(0, posterior.prior.phi.size, 10):
         cut = slice(first, first + 10)
         _, slope = segment_quantities(posterior.prior.phi[cut])
+        # J C J'. The six inertias come as xx, xy, yy, xz, yz, zz.
         variance = np.diag(slope @ posterior.covariance[cut, cut] @ slope.T)
         out.append(np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])]))
     return np.array(out)
@@ -105,6 +106,7 @@ class MovementEvidence:
         """Return the posterior after data that agree with the table."""
         prior = widened_prior(self.body.sip)
         expected = np.column_stack([np.eye(prior.phi.size), prior.phi])  # [W y] = W [1 phi]
+        # [1 phi]'H [1 phi]: the data agree with the table, y = W phi.
         data = Information.of_normal(expected.T @ self.H @ expected, 1)
         return find_posterior(temper(data, self.disturbed, typical_sizes()) if self.H.any() else data, prior)
 
@@ -117,6 +119,7 @@ def movement_evidence(
     few = Motion(motion.time[::step], motion.q[::step], motion.v[::step], motion.a[::step])
     used = np.ones(few.time.size, dtype=bool) if use is None else use[::step]
     fit = Fit("movement", few, predict_wrench(body, few), used)
+    # Upper triangle R of the whitened regressor, R'R its information.
     triangle = statistics(body, fit, noise).information(noise).triangle
     return MovementEvidence(body, triangle.T @ triangle, mismatch(body, (fit,), noise))
 
@@ -138,10 +141,12 @@ def evenly_spread(dance: Dance, steps: int) -> list[int]:
 
 def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
     """Return what is expected when a ``motion`` at (a multiple of) 12.5 Hz stops at each instant ``ends`` (D,) s."""
+    # One noise for all stretches: their informations are about one point and in the same bands.
     noise, size = typical_noise(predict_wrench(body, motion)), 10 * len(body.segments)
     told = [MovementEvidence(body, np.zeros((size, size)), Mismatch(*np.zeros((2, size, 1))))]
     for start, end in pairwise([motion.time[0], *ends]):
         use = (motion.time >= start - 1e-9) & (motion.time < end - 1e-9)
+        # Information of separate stretches adds.
         told.append(told[-1] + movement_evidence(body, motion, use, noise=noise))
     return Expectation.of(body, np.concatenate([[0.0], ends]), [one.posterior() for one in told])
 
@@ -150,6 +155,7 @@ def typical_noise(wrench: Wrench) -> Noise:
     """Return the noise of a typical session about the mean centre of pressure of the planned ``wrench``; the variance
     of a coefficient grows with the rate.
     """
+    # Orthonormal coefficients: the variance of each is the power density times the rate.
     covariance = JUDGED_RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
     return Noise(covariance, np.asarray(wrench.cop().mean(axis=0)), Bands(BANDS.edges, JUDGED_RATE))
 
@@ -194,8 +200,10 @@ def movement_information(dance: Dance) -> MovementInformation:
     """Return by what the parts of ``dance`` are judged."""
     plan = dance.motion(JUDGED_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
+    # Information of a coefficient: 1 / variance.
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened_prior(dance.body.sip).covariance)
+    # V sqrt(lambda): a root of a covariance that may be singular.
     root = vector * np.sqrt(np.maximum(value, 0.0))
     return MovementInformation(
         JUDGED_RATE, root, weights, noise.bands.edges, _FELT * JUDGED_RATE * weights[0, _AT_REST], noise.about
@@ -292,6 +300,7 @@ def score_performance(
     if not any(use.any() for _, use in recorded):
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _FELT))
+    # The performer's body has the joints; the plan gets those it lacks.
     plan = _in_joints_of(body, dance, brief.motion(JUDGED_RATE))
     noise = typical_noise(predict_wrench(body, plan))
     planned = removed_shares(movement_evidence(body, plan, noise=noise).posterior())
@@ -349,6 +358,7 @@ def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:
     new = np.flatnonzero([joint.name not in names for joint in body.joints])
     if not new.size:
         return motion
+    # np.insert counts places in the array as it is before.
     before, root = new - np.arange(new.size), body.nq - len(body.joints)
     q = np.insert(motion.q, before + root, 0.0, axis=1)
     v, a = (np.insert(part, before + body.n_root, 0.0, axis=1) for part in (motion.v, motion.a))

@@ -55,7 +55,9 @@ USUAL_IMPRECISION = Imprecision()
 def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
     """Return instants (T,) s of a performance, and those of the plan (T,) s that belong to them."""
     time = np.arange(round(duration * how.pace * _RATE) + 1) / _RATE
+    # Lognormal: the tempo is never negative.
     tempo = np.exp(how.timing * _noise(rng, time, 1, _TEMPO)[:, 0])
+    # Trapezoidal rule: how much is done by every instant, in any unit.
     done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
     return time, duration * done / done[-1]
 
@@ -69,6 +71,7 @@ def _noise(
     """
     frequency, ahead, aside = _waves(time.tobytes(), cutoff)
     weight = np.exp(-((frequency / cutoff) ** 2))
+    # Cosine and sine together have the variance weight² at any time: the sum is one (without `slow`).
     weight /= np.sqrt(np.sum(weight**2)) * (1 + slow * (2 * np.pi * frequency) ** 2)
     cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
     return np.asarray(ahead[part] @ cosine + aside[part] @ sine)
@@ -80,6 +83,7 @@ def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
     (T,) s, which all performers of a dance share.
     """
     time = np.frombuffer(instants)
+    # Longer than the dance, so that no curve repeats itself in it.
     duration = 1.3 * (time[-1] - time[0]) + 1.0
     frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
     phase = 2 * np.pi * np.outer(time, frequency)
@@ -117,6 +121,7 @@ class PlannedDance:
             parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))  # they hold their feet
         x = np.concatenate(parts)
         up, ankle = self._feet(rows, time)
+        # What the plan keeps below (or above) straight legs; performers keep it, too.
         over = x[:, 2] - self._tops(x, up, ankle)
         self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
 
@@ -128,6 +133,7 @@ class PlannedDance:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
         way = ((when - self.start[rows]) / np.maximum(self.end[rows] - self.start[rows], 1e-9))[:, None]
         before, during, after = np.moveaxis(self.down[rows], 1, 0)
+        # Leaves the ground after the beginning of a move, returns before its end; whichever is less far.
         rise = np.where(before, _eased(way / _LIFT), 1.0) * np.where(after, _eased((1 - way) / _LIFT), 1.0)
         ankle = np.where(way[..., None] < 0.5, self.ankles[rows, 0], self.ankles[rows, 1])
         return np.where(during, 0.0, rise), ankle
@@ -135,6 +141,7 @@ class PlannedDance:
     def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
         """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a raised foot yields."""
         tops = self.chain.root_heights(x, ankle, _STRAIGHT) + up.T
+        # Soft minimum of both: -log(sum of exp(-k h)) / k, without a kink where the leg changes.
         return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
 
     def performed_by(
@@ -186,6 +193,7 @@ class PlannedDance:
             x[:, 2] = self._tops(x, up, ankle) + over
             x = self._standing(x, wanted, up, ankle)
             if k < _ROUNDS:
+                # Newton: the centre of mass goes `_CARRIED` times as far as the pelvis.
                 x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
         return x, rows
 
@@ -196,6 +204,7 @@ class PlannedDance:
             own, meant = np.flatnonzero(up[:, side] < 1), wanted[:, columns]
             flat = np.broadcast_to(UPRIGHT, (own.size, 3, 3))
             held = self.chain.legs[side].solve(turn[own], x[own, :3], flat, ankle[own, side])
+            # From the held leg to the meant one as the foot rises.
             meant[own] = held + up[own, side, None] * (meant[own] - held)
             out[:, columns] = meant
         return out
@@ -314,9 +323,11 @@ def _rooms(
         posture = plan.posture[copy.on]
         for limit, one in asked.items():
             left = one.left(copy)
+            # A step to another place is not judged.
             value = np.where(plan.stepping[copy.on][:, None], np.inf, left.value)
             for first, last in pairwise([0, *end]):
                 own, each = slice(first + 2, last - 2), np.full(len(dance.postures), np.inf)
+                # Several frames belong to one posture: an unbuffered minimum.
                 np.minimum.at(each, posture[own], value[own].min(axis=1))
                 room[limit.name].append(each)
                 what[limit.name].append(left.of[int(value[own].min(axis=0).argmin())])
@@ -360,7 +371,9 @@ def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -
     for limit, one in for_imprecise(limits).items():
         left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
         left = left[:, :, np.isfinite(left).all(axis=(0, 1))]
+        # Over the copies of each instant.
         usual = np.median(left, axis=1)
+        # Root mean square of what lies below the median; the half is made whole: sd of a symmetric error.
         below = np.sqrt(2 * np.mean(np.minimum(left - usual[:, None], 0.0) ** 2, axis=1))
         found.append((float(((usual - one.least) / np.maximum(below, _STILL)).min(initial=np.inf)), limit.name))
     return min(found)

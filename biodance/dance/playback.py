@@ -188,6 +188,7 @@ class _Driver:
     def place(self, data: Any, q: Array, v: Array) -> None:
         """Put the body into a configuration of Pinocchio's order (quaternion x y z w, velocity in the root's frame)."""
         data.qpos[:3], data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
+        # MuJoCo: linear velocity in the world, angular velocity in the body.
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]
         data.qpos[self.q_place], data.qvel[self.v_place] = q[7:], v[6:]
@@ -195,6 +196,7 @@ class _Driver:
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
         """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""
         spring = self.stiffness * (angle - data.qpos[self.q_place])
+        # The model's damper brakes with -d v; with d v_plan added it acts on the difference alone.
         data.qfrc_applied[self.v_place] = torque + spring + _DAMPING * self.stiffness * rate
 
     def touching(self, data: Any) -> set[str]:
@@ -205,6 +207,7 @@ class _Driver:
 
     def gap(self, data: Any, q: Array) -> tuple[Array, float, float]:
         """Return the distances from the plan: joint angles (n,) rad, root m, root's tilt rad."""
+        # The root's up axis, planned and simulated.
         up = quaternion_matrix(np.stack([q[3:7], data.qpos[[4, 5, 6, 3]]]))[:, :, 1]
         cosine = np.clip(up[0] @ up[1], -1.0, 1.0)
         return data.qpos[self.q_place] - q[7:], float(np.linalg.norm(data.qpos[:3] - q[:3])), float(np.arccos(cosine))
@@ -216,6 +219,7 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
     for i in range(data.ncon):
         contact = data.contact[i]
         mujoco.mj_contactForce(model, data, i, local)
+        # Rows of `frame` are the contact's axes in the world.
         force = contact.frame.reshape(3, 3).T @ local[:3]
         total += wrench_of_force(force, contact.pos)
     return total
@@ -283,6 +287,7 @@ def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehea
     motion = short.motion(_RATE)
     played = play(dance.body, motion, friction=friction, down=bearing(short, motion.time))
     feet, inside = [phase.stance for phase in short.phases], np.full(len(played.time), -np.inf)
+    # As planned, a little earlier and a little later: the foot may bear in any of them.
     for late in (0.0, -UNSURE, UNSURE):
         owner = phase_at(short.phases, np.clip(played.time + late, 0.0, short.duration))
         inside = np.maximum(inside, support_depth(feet, owner, played.wrench.cop()[:, :2]))

@@ -152,6 +152,7 @@ def design_robot(
 
 def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
     """Return the dance of ``body`` that is like ``dance`` of its similar model."""
+    # Lengths of the root are m, all else is rad.
     units = np.ones(dance.postures.shape[1])
     units[:3] = to.length
 
@@ -179,6 +180,7 @@ _STEPS = 10  # Durations of a dance after which what is expected is told
 
 def expect_robot(dance: Dance) -> Expectation:
     """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
+    # One band, the same error at all frequencies.
     body, motion, noise = dance.body, dance.motion(_RATE), Noise(np.diag(ERROR**2)[None], np.zeros(3))
     wrench, layout = predict_wrench(body, motion), layout_for(noise.about, noise.bands)
     ends = [dance.phases[k].end for k in evenly_spread(dance, _STEPS)]

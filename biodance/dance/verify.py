@@ -58,6 +58,7 @@ def verify_with(workers: Executor, body: Body, dance: Dance, limits: tuple[Limit
 def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
     """Return the worst margin of every limit, by name; of equal ones the first in time; no number is the worst."""
     worst: dict[str, Margin] = {}
+    # NaN counts as the worst.
     for margin in sorted(margins, key=lambda one: (np.nan_to_num(one.worst, nan=-np.inf), one.where_s)):
         worst.setdefault(margin.limit, margin)
     return tuple(worst[name] for name in sorted(worst))
@@ -70,6 +71,7 @@ def _margins(body: Body, dance: Dance, limits: tuple[Limit, ...], number: int) -
         left = limit.check(motion) if (limit.at_rest if held else limit.in_motion) else NOTHING
         if left.value.size:
             t, k = np.unravel_index(int(np.argmin(left.value)), left.value.shape)
+            # What the check forgives is added, so that zero is the edge.
             worst, where = float(left.value[t, k]) + limit.rounding, float(motion.motion.time[t])
             yield Margin(limit.name, worst, where, limit.unit, left.of[k])
 
@@ -95,6 +97,7 @@ def _continuity(dance: Dance) -> Margin:
     worst, where = np.inf, 0.0
     for before, after in zip(dance.phases[:-1], dance.phases[1:], strict=True):
         a, b = (dance.state(phase, np.array([before.end])) for phase in (before, after))
+        # Both phases at the instant where they meet.
         jump = max(float(np.abs(getattr(a, name) - getattr(b, name)).max()) for name in ("x", "v", "a"))
         if JUMP - jump < worst:
             worst, where = JUMP - jump, before.end
@@ -153,6 +156,7 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     static, _ = total(weight, grams, parts.first)
     blocks = {i: grams[i][np.ix_(parts.first[i], parts.first[i])] for i in every if parts.first[i] and weight[i] > 0}
     poor = [i for i, block in blocks.items() if condition(block)[0] > POOR]
+    # Grows from move to move.
     gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
     straight = replace(dance, via=straight_via(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []

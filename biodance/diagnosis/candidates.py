@@ -51,6 +51,7 @@ class Candidate:
         """(p, k): what each column is in the parameters, for one unit of the first; zero for silent ones."""
         loud = np.flatnonzero(~np.array(self.silent))
         out = np.zeros((len(self.silent), self.basis.shape[1]))
+        # One unit of the first parameter goes with as many of the others as their typical sizes say.
         out[loud, np.arange(loud.size)] = self.effect.typical[loud] / self.effect.typical[0]
         return out
 
@@ -63,6 +64,7 @@ class Candidate:
         if silent.any():
             size = theta[loud[0]] / typical[loud[0]]
             if abs(size) > 0.05:
+                # Silent columns were made at the typical size of the others: coefficient = slope times that size.
                 slopes = SCALE * coefficients[loud.size : loud.size + silent.sum()]
                 theta[silent] = typical[silent] * np.clip(slopes / size, -3.0, 3.0)
         return theta
@@ -127,6 +129,7 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     middle, steps = np.where(silent, 0.0, effect.typical)[:, None], np.diag(effect.typical)[:, silent]
     rows = _in_rows(problem, effect, np.hstack([middle, middle + steps, middle - steps]), effect.added)
     here, up, down = np.split(rows, [1, 1 + steps.shape[1]], axis=1)
+    # Odd part of the change, (up - down) / 2, and the even part, which bends.
     first, second = 0.5 * (up - down), 0.5 * (up + down) - here
     bent = np.linalg.norm(second, axis=0) > _NOTHING * np.linalg.norm(here)
     return [*first.T, *second[:, bent].T]
@@ -143,6 +146,7 @@ def local_basis(problem: Problem, effect: Transient) -> Array | None:
             return None
         block = problem.spectrum.of_trial(index, samples)
         blocks.append(block.reshape(6 * len(block), block.shape[2]))
+    # Block diagonal: every trial has coefficients of its own.
     return np.asarray(block_diag(*blocks))
 
 
@@ -180,4 +184,5 @@ def slopes(
     up, down = np.hsplit(
         _in_rows(problem, effect, np.concatenate([theta + steps, theta - steps]).T, of or effect.added), 2
     )
+    # Central difference; each row of `steps` has one element that is not zero.
     return np.asarray((up - down) / (2 * steps.max(axis=1)))

@@ -47,21 +47,25 @@ class LinearPosterior:
 
     def covariance(self, rows: Array) -> Array:
         """Return the posterior covariance of ``rows`` (q, K) @ coefficients."""
+        # A^-1 is the posterior covariance of the coefficients.
         return np.asarray(rows @ _solved(self.factor, rows.T))
 
     def score(self, Z: Array) -> tuple[Array, Array]:
         """Return s (k,) and G (k, k) of whitened columns ``Z`` (r, k)."""
         half = self.half(self.X.T @ Z)
+        # half = L^-1 X'Z: Z'Z - half'half is the Schur complement of A.
         return Z.T @ self.residual, Z.T @ Z - half.T @ half
 
     def half(self, cross: Array) -> Array:
         """Return H (K, k) with H' H = C' A^-1 C of ``cross`` C = X' Z (K, k)."""
+        # Triangular solve: C'A^-1 C = |L^-1 C|².
         return np.asarray(dtrtrs(self.factor[0], cross, lower=self.factor[1])[0]) if cross.size else cross
 
     def free(self, Z: Array) -> Array:
         """Return the part of whitened columns ``Z`` (r, k) that no tolerance can explain; the score of any target is
         its product with this part.
         """
+        # (1 - X A^-1 X') Z.
         return np.asarray(Z - self.X @ _solved(self.factor, self.X.T @ Z))
 
 
@@ -72,6 +76,7 @@ def _solved(factor: tuple[Array, bool], b: Array) -> Array:
 
 def linear_posterior(X: Array, y: Array) -> LinearPosterior:
     """Return the posterior from whitened columns ``X`` (r, K) and target ``y`` (r,)."""
+    # A = 1 + X'X: data and unit-normal prior.
     factor = cho_factor(X.T @ X + np.eye(X.shape[1]), lower=True)
     return LinearPosterior.for_target(X, factor, y)
 
@@ -95,12 +100,14 @@ def evidence(s: Array, G: Array, length: float) -> Evidence:
     """
     inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
     mean = inner @ s
+    # log Bayes factor of unit-normal coefficients: 1/2 s'(1 + G)^-1 s - 1/2 log|1 + G|.
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
     return Evidence(value, mean, inner, visible(G, length))
 
 
 def visible(G: Array, length: float) -> float:
     """Return the share of a cause that is left when all that is no fault may adapt, as `evidence` has it."""
+    # tr(G) over the squared length: share of the square that no nuisance explains.
     return float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0
 
 
@@ -119,6 +126,7 @@ def _moments(G: Array, shift: Array) -> tuple[float, float, float, float]:
     """Return what the shift adds to mean and variance of `surely_reached`, and what chance does."""
     inner = np.linalg.inv(np.eye(len(G)) + G)
     pull, share = inner @ shift, inner @ G
+    # At size zero E[s s'] = G: mean of the log factor 1/2 tr(G (1 + G)^-1) - 1/2 log|1 + G|.
     chance = 0.5 * float(np.trace(share) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
     return 0.5 * float(shift @ pull), float(pull @ G @ pull), chance, 0.5 * float(np.trace(share @ share))
 
@@ -132,6 +140,7 @@ def smallest_detectable(G: Array, direction: Array, need: float) -> float:
         return float("inf")
     # growth a^2 - lack = below sqrt(bend a^2 + spread), squared: the larger root
     lack, below = need - chance, _BELOW**2
+    # In x = a²: (growth x - lack)² = below (bend x + spread), a quadratic equation.
     half = growth * lack + 0.5 * below * bend
     root = half**2 - growth**2 * (lack**2 - below * spread)
     return float(np.sqrt(max(half + np.sqrt(max(root, 0.0)), 0.0))) / growth

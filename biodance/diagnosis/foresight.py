@@ -135,6 +135,7 @@ def _confusions(seen: Visibility, rows: tuple[Unobservable, ...]) -> tuple[Confu
         if not told[one.names]:
             continue
         fixed, growth = seen.separation(i)
+        # Expected at the typical size a: fixed + growth a².
         difference = fixed + growth * one.effect.typical[one.silent.index(False)] ** 2
         difference[i] = np.inf
         nearest = int(np.argmin(difference))

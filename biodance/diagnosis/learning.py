@@ -72,6 +72,7 @@ def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 
 def _beside(start: Tolerances, worth: float, learned: Tolerances, count: int) -> Tolerances:
     """Return what ``count`` sessions say beside what ``worth`` sessions said before: mean squares."""
     share = worth / (worth + count)
+    # Mean squares, not deviations, are averaged by their worth in sessions.
     sizes = {
         key: float(np.sqrt((1 - share) * size**2 + share * start.size(key) ** 2)) for key, size in learned.sizes.items()
     }
@@ -87,6 +88,7 @@ def shown_by(nulls: Iterable[Null], found: Tolerances) -> dict[str, float]:
         some = _posterior(null, found)
         for key, variance in zip(null.keys, some.variance, strict=True):
             if key and np.isfinite(variance):
+                # Share of the size's variance that the session took off.
                 count[key] = count.get(key, 0.0) + max(0.0, 1 - float(variance) / found.size(key) ** 2)
     return count
 
@@ -109,14 +111,18 @@ def _posterior(null: Null, found: Tolerances) -> _Posterior:
     size = np.array([1.0 if key == "" else found.size(key) for key in null.keys])
     expected = np.array([found.mean(name) if name else 0.0 for name in null.mean_keys or null.keys])
     known = np.flatnonzero(size > 0)
+    # Coefficients of unit variance: columns times the sizes, less what is expected.
     scaled = null.columns[:, known] * size[known].astype(null.columns.dtype)
     target = null.target - shown_left_out(null.columns[:, known] @ expected[known], null.marker_keys)
     X = whitened(scaled, null.band, null.marker_keys, null.mass, found)
     y = whitened(target[:, None].astype(X.dtype), null.band, null.marker_keys, null.mass, found)[:, 0]
+    # A = X'X + 1: data and unit-normal prior.
     factor = cho_factor((X.T @ X).astype(float) + np.eye(known.size), lower=True)
     mean, covariance = cho_solve(factor, (X.T @ y).astype(float)), cho_solve(factor, np.eye(known.size))
     value, variance = np.full((2, size.size), np.nan)
+    # Back to the units of the coefficients.
     value[known], variance[known] = expected[known] + size[known] * mean, size[known] ** 2 * np.diag(covariance)
+    # scaled @ chol(covariance): a root of what the coefficients leave uncertain in the rows.
     return _Posterior(
         value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype)
     )
@@ -136,10 +142,12 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
             if row[0] and np.isfinite(row[2])
         ]
         wrench = 6 * null.band.size
+        # E[r²]: square of the residual at the mean plus the posterior variance.
         seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
         rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
         parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
         here = moments_of(parts, null.band, bands)
+        # Noise is stated for the reference person.
         total = total + replace(here, residual=here.residual * (REFERENCE_PERSON / null.mass) ** 2)
     means, sizes = sizes_of(rows)
     learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}

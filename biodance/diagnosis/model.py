@@ -32,6 +32,7 @@ class Model:
     @property
     def phi(self) -> Array:
         """(10N,) posterior mean of the parameters."""
+        # phi = phi0 + S u.
         return self.problem.prior.phi + self.problem.factor @ self.posterior.mean[: self.problem.factor.shape[1]]
 
     def white(self, rows: Array, *, out: Array | None = None) -> Array:
@@ -83,6 +84,7 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
         parts.append(one.basis)
         key, width = key_of(*one.names), one.basis.shape[1]
         tolerated[one.names] = slice(len(keys), len(keys) + width), one.units
+        # A basis is per SCALE typical sizes: back to one unit of the first parameter.
         scale += [1 / (SCALE * one.effect.typical[0])] * width
         own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
@@ -124,6 +126,7 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
     sizes = np.array([tolerances.size(key) for key in known.keys])
     columns *= sizes
+    # Target less what is expected, whitened together with the columns.
     both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
     return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected)

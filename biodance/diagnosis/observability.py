@@ -48,6 +48,7 @@ class Visibility:
         recordings; each of several forces or masses at once in the same size: the worst of them.
         """
         one, cut = self.causes[index], self.cuts[index]
+        # Log odds of `NAMED` less the prior's.
         need = float(np.log(NAMED / (1 - NAMED))) - self._prior[one.names]
         size = max(smallest_detectable(self.G[cut, cut], way, need) for way in unit_directions(one))
         if self.found is None or one.effect.linear or any(one.silent):
@@ -70,6 +71,7 @@ class Visibility:
         """
         way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
         pull = (self.G[:, cut] @ way)[self._places]
+        # 1/2 shift'(1 + G)^-1 shift, the shift that a unit of this cause gives to every score.
         growth = 0.5 * np.sum((pull[:, None] @ self._padded)[:, 0] * pull, axis=1)
         return self._fixed[index] - self._fixed, growth[index] - growth
 
@@ -99,6 +101,7 @@ class Visibility:
     def _fixed(self) -> Array:
         """(C,) expected log Bayes factor of every cause at size zero."""
         blocks = [self.G[c, c] for c in self.cuts]
+        # At size zero E[s s'] = G: 1/2 tr((1 + G)^-1 G) - 1/2 log|1 + G|.
         return np.array(
             [
                 -0.5 * np.linalg.slogdet(np.eye(len(b)) + b)[1] + 0.5 * np.trace(i @ b)
@@ -115,6 +118,7 @@ class Visibility:
         need = TOGETHER - fixed[others]
         if np.any((growth[others] <= 1e-9) & (need > 0)):
             return float("inf")
+        # fixed + growth a² = TOGETHER.
         size = np.sqrt(np.maximum(need, 0.0) / np.maximum(growth[others], 1e-9))
         return float(size.max(initial=0.0))
 
@@ -138,6 +142,7 @@ def unit_directions(one: Candidate) -> list[Array]:
     loud = np.flatnonzero(~np.array(one.silent))
     same = [k for k in loud if one.effect.parameters[k].unit == one.effect.parameters[loud[0]].unit]
     width = one.basis.shape[1]
+    # A unit-normal coefficient is SCALE typical sizes.
     return [np.eye(width)[i] / (SCALE * one.effect.typical[k]) for i, k in enumerate(loud) if k in same]
 
 
@@ -165,15 +170,18 @@ def after_calibration(seen: Visibility, body: Body) -> Visibility:
     )
     share = np.repeat([left[joint] for joint in left if joint in at], 3)
     own = np.diag(seen.G)[picks]
+    # A nuisance of variance size² leaves G / (1 + size² G): size² = (1 / share - 1) / G.
     size = np.sqrt((1 / share - 1) / np.maximum(own, 1e-12))
     taken = seen.G[:, picks] * size
     inner = np.eye(len(picks)) + size[:, None] * seen.G[np.ix_(picks, picks)] * size
+    # Schur complement with these centres free.
     return replace(seen, G=seen.G - taken @ np.linalg.solve(inner, taken.T))
 
 
 def placing_leaves(error: JointError) -> float:
     """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
     fixed, before = fixed_point(error.joint), centre_sd(error.joint, contradicted=error.contradicted)
+    # Variance left over variance before, without what no fixed point gives.
     return float(np.clip((error.centre**2 - fixed**2) / before**2, 0.01, 1.0))
 
 

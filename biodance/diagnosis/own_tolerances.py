@@ -125,6 +125,7 @@ def _unseen_note(body: Body) -> str:
 
 def _unrest_note(shaken: Array) -> str:
     """Say how large an unrest of covariance ``shaken`` (B, 6, 6) per coefficient is."""
+    # A band of width w holds 2 w / rate of all coefficients: so much of each variance adds to the mean square.
     size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
     return (
         f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
@@ -140,6 +141,7 @@ def widened_by(known: Tolerances, factor: float) -> Tolerances:
     sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in known.sizes.items()}
     more = np.full((len(known.noise), 6), factor)
     more[0, :3] = 1.0
+    # D N D with D = diag(more): correlations stay.
     return replace(known, sizes=sizes, noise=known.noise * more[:, :, None] * more[:, None, :])
 
 
@@ -167,7 +169,9 @@ def unrest(body: Body, standing: tuple[TrialWindow, ...], about: Array) -> Array
     out = np.zeros((len(BANDS), 6, 6))
     for b in np.flatnonzero(np.array(BANDS.edges[:-1]) >= SWAYING):
         here = left[where.band == b]
+        # Parseval: over the number of samples.
         size = np.sqrt(np.sum(here**2, axis=0) / (BANDS.rate * where.seconds))
+        # What is larger is scaled down to `UNREST`.
         believed = here * np.minimum(1.0, UNREST / np.maximum(size, 1e-9))
         out[b] = believed.T @ believed / max(1, len(here))
     return out

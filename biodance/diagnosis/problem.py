@@ -134,6 +134,7 @@ class Problem:
         """
         frames = max(1, sum(pick.size for picks in self.spectrum.picks for pick in picks))
         wrench, markers = np.split(rows, [self.wrench_rows])
+        # Parseval: squares of orthonormal coefficients over the frames are a mean square over time.
         size = np.sqrt(np.sum(wrench.reshape(-1, 6, rows.shape[1]) ** 2, axis=0) / frames)
         share = (size / np.repeat([LEAST_FORCE, LEAST_MOMENT], 3)[:, None]).max(axis=0)
         return np.where(np.any(markers != 0, axis=0), np.inf, share)
@@ -161,6 +162,7 @@ class Problem:
                 full[list(case.marker_columns)] = columns
                 out += weight * full.reshape(self.markers, -1)
         sizes = np.zeros((len(self.shown), out.shape[1]))
+        # A size that the markers show answers to its own cause alone, in the first parameter.
         sizes[[one == (effect.name, effect.target) for one in self.shown], 0] = 1.0
         return np.concatenate([out, sizes])
 
@@ -209,6 +211,7 @@ def problem(
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)
+    # W S: one column per unit-normal coefficient of the prior.
     W = where.rows(regressor_of(case.segments, gravity=body.gravity, sharing=body.sharing) @ factor for case in cases)
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     rows, unit = _kinematic_rows(where, _errors(body, cases, where), len(shown))
@@ -271,6 +274,7 @@ def _kinematic_rows(
         rows = bands.coefficients(where.layout.shift @ one.wrench)[kept]
         wrench.append(rows.reshape(-1, rows.shape[2]).astype(np.float32))
         names = names or tuple(zip(one.groups, one.joints, strict=True))
+        # Mean over all runs, weighted with their frames.
         markers = markers + pick.size * one.markers
         frames += pick.size
     mean = (markers / frames).reshape(-1, len(names)).astype(np.float32)

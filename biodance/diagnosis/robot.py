@@ -104,6 +104,7 @@ def _cause_columns(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[Ro
     ]
     encoders, groups = len(causes), _legs_and_pairs(body, torque)
     for some in groups:
+        # One unit: `GIVE` rad at the mean RMS torque, as rad per N·m.
         per = GIVE / float(torque[list(some)].mean() + 1e-9)
         causes.append(RobotCause("flexible_joint", _both(names, some), per, "rad/(N·m)", some))
     causes += [RobotCause("backlash", _both(names, some), 2 * GIVE, "rad", some) for some in groups]
@@ -236,6 +237,7 @@ def robot_causes(
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
         if best < 0 or len(found) == _MOST:
             return tuple(found), trials
+        # From now on this cause may be as large as one that is there.
         here[best] = np.hypot(columns.wide[best], here[best])
         later = float(both[best] - gain[best]) if kept else float("nan")
         cause = columns.causes[best]
@@ -273,6 +275,7 @@ def _refined(
         k = columns.causes.index(one.cause)
         more, sd = float((covariance @ b)[size + k]), float(np.sqrt(covariance[size + k, size + k]))
         per, most = one.cause.per, _WORST * columns.wide[k]
+        # The correction may not carry the whole value beyond `most`.
         more = float(np.clip(one.value / per + more, -most, most) - one.value / per)
         value = one.value + more * per
         unshared = _SHARED * abs(value) if one.cause.kind in _LOADED_KINDS else 0.0
@@ -328,6 +331,7 @@ def _learned(total: Statistics, noise: Noise, sd: Array, start: Array) -> Noise:
 
 def _posterior(A: Array, sd: Array) -> Array:
     """Return the covariance (c, c) of unknowns with standard deviations ``sd`` (c,) before the data."""
+    # C = D (1 + D A D)^-1 D with D = diag(sd): right for deviations of zero, too.
     inner = np.eye(len(sd)) + sd[:, None] * A * sd
     return np.asarray(sd[:, None] * np.linalg.solve(inner, np.diag(sd)))
 
@@ -337,6 +341,8 @@ def _gains(A: Array, b: Array, usual: Array, large: Array) -> Array:
     sd, wide = (np.append(np.ones(len(b) - len(one)), one) for one in (usual, large))
     C = _posterior(A, sd)
     AC = A @ C
+    # Each unknown beside all others at their usual size: score b - A C b, information diag(A - A C A).
     score, precision = b - AC @ b, np.maximum(np.diag(A) - np.einsum("ij,ji->i", AC, A), 0.0)
     more = 1 + wide**2 * precision
+    # Evidence of a variance wide² more: 1/2 (s w)² / (1 + w² p) - 1/2 log(1 + w² p).
     return np.asarray(0.5 * (score * wide) ** 2 / more - 0.5 * np.log(more))

@@ -57,6 +57,7 @@ class Spectrum:
         parts = []
         for pick in self.picks[index]:
             kept = bands.of(pick.size) >= 0
+            # Moments about the standing point first, then the transform along time.
             parts.append(bands.coefficients(self.layout.shift @ samples[pick])[kept])
         return np.concatenate(parts) if parts else np.empty((0, 6, samples.shape[2]))
 

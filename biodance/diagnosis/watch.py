@@ -68,6 +68,7 @@ class MarkerWatch:
         off = now > limit
         if not off.any():
             self.count += 1
+            # Running mean: a look counts 1 / count, later 1 / `_REFERENCE`.
             self.usual = self.usual + (now**2 - self.usual) / min(self.count, _REFERENCE)
         return np.asarray(off)
 
@@ -123,7 +124,9 @@ class WrenchWatch:
         W1, late = (np.array(part) for part in zip(*self.now, strict=True))
         usual, latest = then - W0 @ posterior.mean, late - W1 @ posterior.mean
         jump = latest.mean(axis=0) - usual.mean(axis=0)
+        # Uncertain parameters count through the difference of the regressors: what both share cancels.
         _, unknown = posterior.expected(W1.mean(axis=0) - W0.mean(axis=0))
+        # At `SIGMAS_OF_A_JUMP` deviations a jump is at least `_SMALLEST_JUMP` of the weight.
         sd = np.sqrt(_slow_variance(usual) + unknown + (_SMALLEST_JUMP * self.weight / SIGMAS_OF_A_JUMP) ** 2)
         size = np.abs(jump) / sd
         self.wrong = bool((size > SIGMAS_OF_A_JUMP).any())
@@ -134,6 +137,7 @@ class WrenchWatch:
         if len(self.before) < _LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
         W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
+        # What the body leaves, and what no body may leave less of.
         return np.asarray((wrench - W @ posterior.mean).var(axis=0)) + (_SMALLEST_JUMP * self.weight / 2) ** 2
 
 

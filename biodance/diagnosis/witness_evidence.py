@@ -137,6 +137,7 @@ class ObservedEvidence:
         size = self.causes[cause].step * _FAULT
         total: dict[str, float] = {}
         for one, column in zip(self.observations, self.sensitivities[cause], strict=True):
+            # Squares in standard deviations add over independent observations.
             total[one.observer] = total.get(one.observer, 0.0) + (size * column / one.expected_sd) ** 2
         return tuple(name for name, power in total.items() if power**0.5 >= least)
 
@@ -162,7 +163,9 @@ def cause_visibilities(evidence: ObservedEvidence) -> tuple[CauseVisibility, ...
     counting, family = evidence.counting, observers()
     responded = {one.observer for one in evidence.observations}
     sd = np.array([one.sd for one in counting.observations])
+    # Own errors on the diagonal, shared ones as outer products.
     inner = np.diag(sd**2) + counting.shared @ counting.shared.T
+    # S^-1 c of every cause: c'S^-1 c is the information on its size.
     white = {name: np.linalg.solve(inner, one) if one.size else one for name, one in counting.sensitivities.items()}
     power = {name: float(counting.sensitivities[name] @ white[name]) for name in counting.sensitivities}
     found = []
@@ -176,6 +179,7 @@ def cause_visibilities(evidence: ObservedEvidence) -> tuple[CauseVisibility, ...
             and abs(counting.sensitivities[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
         )
         missing = [one for one in family.values() if cause.effect in one.responds_to and one.name not in responded]
+        # Standard deviation of the size: information^-1/2.
         size = power[name] ** -0.5 if seen else float("inf")
         found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in missing)))
     return tuple(sorted(found, key=lambda one: not one.observers))
@@ -254,6 +258,7 @@ def _correlate_strides(found: tuple[Observation, ...]) -> tuple[Observation, ...
     repeats the error of a step while walking on, so that twenty equal strides are not twenty independent observations.
     """
     count = Counter(one.stride for one in found)
+    # Variance split: one part repeats from stride to stride, the rest is each step's own.
     return tuple(
         one
         if count[one.stride] == 1
@@ -274,6 +279,8 @@ def _apply_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> O
     usual = sum(one.norms[name] ** 2 for name in own)
     if not usual or abs(value) > _HABIT * np.sqrt(usual + sd**2):
         return one
+    # Best linear estimate of the laboratory's part of the norm.
     share = usual / (usual + sd**2)
+    # What stays uncertain of that part: variance 1 - share.
     left = {name: size * (np.sqrt(1 - share) if name in own else 1.0) for name, size in one.norms.items()}
     return replace(one, expected=one.expected + share * value, norms=left)

@@ -66,6 +66,7 @@ class AddedMass(Effect):
         """Return (4,) no mass, and the CoM that its place is counted from, in the segment's joint frame."""
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 4]
+        # No mass, and the centre of mass h / m.
         return np.append(0.0, table[1:] / table[0])
 
     def possible(self, theta: Array) -> bool:

@@ -150,6 +150,7 @@ def on_one_plate(case: Case, name: str, about: Array) -> tuple[Array, Array, Arr
     rows = np.concatenate([own[used][:, None], needed[used][:, None], doubt.swapaxes(1, 2)], axis=1)
     flat = wrench_about_point(rows, about).reshape(len(used), -1)
     nuisance = np.stack([np.ones(len(used)), needed[used, 2]], axis=1)
+    # What a constant and the needed vertical force explain is taken off, from all columns alike.
     rest = (flat - nuisance @ np.linalg.lstsq(nuisance, flat, rcond=None)[0]).reshape(rows.shape)
     return rest[:, 0], rest[:, 1], rest[:, 2:].swapaxes(1, 2)
 
@@ -172,6 +173,7 @@ def _misfit(left: Array, doubt: Array, noise: float) -> float:
     """Return min over u of |left - doubt u|^2 / noise^2 + |u|^2: what no likely body explains of ``left`` (n,)."""
     inner = np.eye(doubt.shape[1]) * noise**2 + doubt.T @ doubt
     across = doubt.T @ left
+    # Woodbury: min over u is (l'l - l'D (noise² + D'D)^-1 D'l) / noise².
     return float(left @ left - across @ np.linalg.solve(inner, across)) / noise**2
 
 
@@ -187,10 +189,12 @@ def moment_point(measured: Array, needed: Array, channel: str, centre: Array) ->
     moment, axis, share = _LEVERS[channel]
     force = -measured[:, CHANNELS.index(channel)]
     left = (measured - needed)[:, CHANNELS.index(moment)]
+    # Least squares of the moment's error on the true force; its slope is twice the lever (`_LEVERS`).
     ratio = float(force @ left / (force @ force))
     rest = left - ratio * force
     if not rest @ rest < MIRRORED * (left @ left):
         return np.nan, np.nan
+    # Standard error of a slope: residual variance over the sum of squares.
     sd = float(np.sqrt(rest @ rest / len(rest) / (force @ force)))
     return float(centre[axis]) + share * ratio, abs(share) * sd
 

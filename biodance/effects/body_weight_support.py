@@ -77,6 +77,7 @@ class BodyWeightSupport(Effect):
         rope = max(ROPE + longer, _SHORTEST)
         hook = np.array([*(_middle(case) + aside), upright + rope])
         length = np.linalg.norm(hook - point, axis=1)
+        # Direction times tension: divided by the length once.
         pull = (force + stiffness * (length - rope)) / length
         return -wrench_of_force(pull[:, None] * (hook - point), point)
 

@@ -93,6 +93,7 @@ def flat_level(values: Array, rate: float) -> float | None:
     if not span > 0 or np.unique(np.round(values / (_SAME * span))).size < _LEVELS:
         return None
     same = np.abs(np.diff(values)) <= _SAME * span
+    # Starts of all runs of equal neighbours; their ends below.
     starts = np.flatnonzero(same & ~np.append(False, same[:-1]))
     stops = np.flatnonzero(same & ~np.append(same[1:], False)) + 1
     lengths, levels = stops - starts, values[starts]

@@ -71,6 +71,7 @@ class ExternalContact(Transient):
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)
         far[1] = low[1] if index else 0.0
+        # The far end at the middle of the lower face; the root's own middle.
         point = case.poses.points([index], (far + self.place)[None])[:, 0]
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
@@ -82,7 +83,9 @@ class ExternalContact(Transient):
             return None
         time = case.motion.time
         knots = time[0] + self.step * np.arange(int((time[-1] - time[0]) / self.step) + 2)
+        # Spline through unit values: column k is the course of knot k.
         course = CubicSpline(knots, np.eye(knots.size))(time)
+        # (T, 6, knots, 3): coefficients knot by knot, its three forces together.
         return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
 
     def beside(self, place: Array) -> "ExternalContact":

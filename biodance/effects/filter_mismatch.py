@@ -61,6 +61,7 @@ class FilterMismatch(Effect):
 
     def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the cut-off itself, Hz; its standard deviation to first order."""
+        # 1 / fc⁴ grows with the parameter; d fc / d(1 / fc⁴) = -fc / (4 / fc⁴).
         inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)
         cutoff = inverse**-0.25
         return (("cutoff", cutoff, 0.25 * cutoff / inverse * STRENGTH * float(sd[0]), "Hz"),)
@@ -75,7 +76,9 @@ def _passed(case: Case, value: Array, lower: float) -> Array:
     not raise more what lies over the reference.
     """
     change = STRENGTH * lower
+    # (frequency of the cosine)^4, as of a second-order Butterworth's squared gain.
     steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4
+    # Negative changes raise what is fast; beyond the reference by no more than at it.
     gain = 1 / (1 + change * steep) if change >= 0 else 1 - change * np.minimum(steep, REFERENCE**4)
     return np.asarray(idct(gain[:, None] * dct(value, axis=0, norm="ortho"), axis=0, norm="ortho"))
 

@@ -132,6 +132,7 @@ def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
     frames, rate = case.motion.time.size, case.motion.rate
     if frames < 2 * _EDGE * rate + 2 * rate or rate < 3 * BAND:
         return None
+    # At rest in every posture: what gravity alone needs.
     still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
     weight = predict_wrench(case.body, still, case.phi).force
     force = case.trial.wrench.force
@@ -139,6 +140,7 @@ def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
         return None
     needed = case.predicted[:, :3] - weight
     measured = force * (case.predicted[:, 2].mean() / force[:, 2].mean()) - weight
+    # Mean difference off: zeros of plates and a wrong mass tell nothing of the clock.
     measured = measured - (measured - needed).mean(axis=0)
     smooth = low_pass(np.hstack([measured, needed]), rate, LowPass(order=4, cutoff=BAND))
     inside = slice(int(_EDGE * rate), -int(_EDGE * rate))
@@ -161,10 +163,13 @@ def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
     away = np.zeros(factor.shape[1])
     for _ in range(_STEPS):
         here = phi + factor @ away
+        # Columns: parameters in prior standard deviations, then the square of the clock's ratio.
         slopes = np.column_stack([(heavy + square * driven) @ factor, driven @ here])
         left = measured - (heavy + square * driven) @ here
+        # Unit-normal prior of the parameters, none of the clock.
         inner = slopes.T @ slopes + np.diag([*np.ones(away.size), 0.0])
         step = np.linalg.solve(inner, slopes.T @ left - np.append(away, 0.0))
+        # The square stays positive, at least a tenth of what it was.
         away, square = away + step[:-1], max(square + step[-1], 0.1 * square)
     here = phi + factor @ away
     moving = measured - heavy @ here
@@ -184,6 +189,7 @@ def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
     force = case.trial.wrench.value[take]
     force = force * (np.mean(whole[:, 2] @ case.phi) / np.mean(force[:, 2]))
     shift, count = np.eye(6), int(2 * BAND * some.time.size / some.rate)
+    # M about the standing point: M - c x F.
     shift[3:, :3] = -skew(np.array([*np.median(some.q[:, :2], axis=0), 0.0]))
 
     def coefficients(values: Array) -> Array:
@@ -199,6 +205,7 @@ def late(measured: Array, needed: Array, rate: float) -> float:
     least-squares fit.
     """
     speed = np.gradient(needed, 1 / rate, axis=0)
+    # measured(t) = needed(t - d) is about needed - d needed'.
     return float(-((measured - needed) * speed).sum() / max((speed**2).sum(), 1e-12))
 
 

@@ -44,13 +44,16 @@ class LabTilt(Effect):
         """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment
         with it.
         """
+        # Gravity turned by a small angle about the axis: g + axis x g.
         turned = np.cross(axis_vector(self.target), case.body.gravity)
         table = case.body.link_parameters(case.phi).reshape(-1, 10)
         move = case.segments
+        # sum over segments n of R h + m p: first moment about the lab origin.
         first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum(
             "tni,n->ti", move.position, table[:, 0]
         )
         force = np.tile(-table[:, 0].sum() * turned, (len(first), 1))
+        # Needed force -m g, its moment first x (-g): both with the turned part of gravity.
         return np.concatenate([force, np.cross(first, -turned)], axis=1)[:, :, None]
 
 

@@ -81,6 +81,7 @@ def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
     window = np.hanning(len(values))
     spectrum = (
         2
+        # A sine of amplitude A has |X| = A sum(window) / 2 at its frequency.
         * np.abs(np.fft.rfft(np.nan_to_num(values - np.nanmean(values, axis=0)) * window[:, None], axis=0))
         / window.sum()
     )

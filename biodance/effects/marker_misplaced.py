@@ -91,8 +91,10 @@ class MarkerMisplaced(Effect):
         if not found:
             return theta
         apart, angles = map(np.concatenate, zip(*found, strict=True))
+        # Angles in units of skin's own standard deviation: slide per radian over soft tissue.
         slides = error_size("slide", "marker") / error_size("soft_tissue", "marker") * angles
         inner = np.eye(len(apart)) + slides @ slides.T  # covariance of one axis beside its place, per skin's variance
+        # Generalised least squares of a constant: 1'C^-1 x / 1'C^-1 1.
         weight = np.linalg.solve(inner, np.ones(len(apart)))
         return np.asarray(weight @ apart / weight.sum()) if len(apart) else theta
 
@@ -114,6 +116,7 @@ class MarkerMisplaced(Effect):
         pose, index = poses(body, q), body.markers.names.index(self.target)
         segment = body.markers.segment[index]
         apart = markers[self.target][every] - pose.points([segment], body.markers.position[[index]])[:, 0]
+        # Segment axes: R' d.
         local = np.einsum("tij,ti->tj", pose.rotation[:, segment], apart)
         seen = np.isfinite(local).all(axis=1)
         return local[seen], q[seen, 7 if body.n_root else 0 :][:, neighbours(body)[:, segment] > 0]

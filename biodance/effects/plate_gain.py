@@ -111,6 +111,8 @@ class PlateGain(InstalledPlate):
         """
 
         def apart(off: list[float]) -> float:
+            # Squared deviation of the place of pressure, in standard deviations: chi-square of
+            # one degree of freedom.
             return float(((np.mean(off) - usual) / sd) ** 2)
 
         mass = np.inf if trials else apart([one.off for one in found.values()])
@@ -121,6 +123,7 @@ class PlateGain(InstalledPlate):
             if len(sizes) == len(found) and np.ptp(gains) < 2 * _SURE and abs(np.mean(gains)) > _LARGE:
                 ranked.append((apart([off for _, off in sizes]), name, float(np.mean(gains))))
         off, plate, gain = min(ranked, default=(np.inf, "", 0.0))
+        # Better than a wrong mass by `_NAMED`, and not unlikely by itself.
         if not off < min(mass - _NAMED, _TOLD):
             return None
         alike = [(cls.name, name) for other, name, _ in ranked if name != plate and other - off < _TOLD]
@@ -136,6 +139,7 @@ class PlateGain(InstalledPlate):
         """Return the trial with the plate's record divided by its gain; without plates where that is dead."""
         if found.size < _DEAD:
             return replace(trial, plates=())
+        # Reads (1 + gain) times the load.
         plates = (
             replace(p, wrench=Wrench(p.wrench.time, p.wrench.value / (1 + found.size))) if p.name == found.target else p
             for p in trial.plates

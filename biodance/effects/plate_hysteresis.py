@@ -71,6 +71,7 @@ def memory(load: Array, reversal: float) -> Array:
     It starts in the middle of the loop; exact for a load (T,) that is monotonic between samples.
     """
     step = np.diff(load)
+    # Relaxation towards +-1 over the distance that the load moves: exact where it is monotonic.
     way, stay = np.sign(step), np.exp(-np.abs(step) / reversal)
     state = np.zeros(load.size)
     for k in range(step.size):

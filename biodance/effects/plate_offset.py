@@ -120,6 +120,7 @@ def _zeros(session: Session) -> dict[str, dict[str, tuple[float, bool]]]:
     single = all(len(trial.plates) < 2 for trial in session.trials)
     for trial in session.trials:
         for plate in trial.plates:
+            # What the reader has taken off is known for forces only.
             reads = np.append(plate.zero, np.zeros(3)) if plate.tared else empty_reading(plate)
             if reads is None:
                 continue
@@ -151,6 +152,7 @@ def _zeroed(plate: Plate) -> Plate:
     reads = None if plate.tared else empty_reading(plate)
     if reads is None:
         return plate
+    # The reading is about the plate's centre, the record about the lab origin.
     value = plate.wrench.value - wrench_about_origin(reads, plate.centre)
     return replace(plate, wrench=Wrench(plate.wrench.time, value))
 

@@ -95,6 +95,7 @@ def with_channels_exchanged(trial: Trial, first: str, last: str) -> Trial:
 
 def _read_by(plate: Plate, other: Plate) -> Plate:
     """Return ``plate`` with what the channels of the ``other`` one read."""
+    # Plate axes to plate axes: as the other plate's amplifier would have read them.
     turn = _axes(plate) @ _axes(other).T
     local = wrench_about_point(other.wrench.value, other.centre)
     value = wrench_about_origin(np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T]), plate.centre)
@@ -104,6 +105,7 @@ def _read_by(plate: Plate, other: Plate) -> Plate:
 def _axes(plate: Plate) -> Array:
     """Return the axes of a plate (3, 3), in columns, as the order of its corners says them (C3D manual)."""
     one, two, three, four = plate.corners
+    # C3D: corners 1 and 4 lie at positive x, 1 and 2 at positive y.
     x = (one + four - two - three) / np.linalg.norm(one + four - two - three)
     z = np.cross(x, one + two - three - four)
     z /= np.linalg.norm(z)

@@ -78,6 +78,7 @@ class SegmentLength(Effect):
         """Return the trial tracked again with the longer body."""
         body = case.body
         for chain in self._far(case):
+            # Along the bone: from the near joint's origin to the far joint.
             out = body.joints[chain[0]].translation
             body = move_joint(body, chain[0], float(theta[0]) * out / np.linalg.norm(out))
         return replace(case, body=body, motion=track(body, case.trial))
@@ -90,6 +91,7 @@ class SegmentLength(Effect):
     def _own(self, case: Case) -> list[int]:
         """Return the columns of the far joints in ``Geometry.joint_changes``."""
         far = self._far(case)
+        # Column 3 of each joint is the segment longer towards it.
         return [4 * i + 3 for i, chain in enumerate(joint_chains(case.body).values()) if chain in far]
 
 

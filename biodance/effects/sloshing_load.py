@@ -87,6 +87,7 @@ class SloshingLoad(Effect):
         rigid = case.needed_by(point_mass(1.0, local), index)
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
+        # Only what moves in the horizontal plane sloshes.
         level = np.array([1.0, 1.0, 0.0])
         return rigid, oscillator_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 

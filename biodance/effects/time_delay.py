@@ -26,6 +26,7 @@ _LABORATORY = 0.006
 def moved_in_time(time: Array, value: Array, delay: Array) -> Array:
     """Return ``value`` (T, n) late by ``delay`` (T,) s (quintic spline); held constant beyond the ends."""
     spline = make_interp_spline(time, value, k=min(5, time.size - 1))
+    # late by d: value at t - d; beyond the ends the first and last sample.
     return np.asarray(spline(np.clip(time - delay, time[0], time[-1])))
 
 
@@ -104,6 +105,7 @@ class TimeDelay(Effect):
         lag = float(weight @ [one.lag for one in found.values()] / weight.sum())
         where = f"In {trials[0]}" if trials else "In all trials that tell"
         text = f"{where} the forces come {1000 * abs(lag):.0f} ms {'late' if lag > 0 else 'early'}."
+        # Laboratories differ in their lag, however well the trials agree.
         sd = float(np.hypot(weight.sum() ** -0.5, _LABORATORY))
         return QualityCheck("clock of the forces", False, text, cls.name, "", lag, "delay", "s", sd=sd, trials=trials)
 
@@ -116,6 +118,7 @@ class TimeDelay(Effect):
 
 def _is_late(one: LagAndMass) -> bool:
     """Return whether the forces come so late that gates hide it, and clearly go with the trunk only then."""
+    # The lag must explain most of what no lag leaves: 1 - r² at it over 1 - r² at none.
     return bool(abs(one.lag) > _LARGE and 1 - one.correlation**2 < _EXPLAINS * (1 - one.unmoved**2))
 
 

@@ -80,8 +80,10 @@ class UnequalLimbs(Effect):
         own, other, rest = limb_and_rest(case.body, self.target, case.phi)
         index = 10 * case.body.segment_index(self.target)
         matter = case.phi[index : index + 10] / case.phi[index]
+        # Matter of the first segment moved along the way from joint to centre of mass, per metre and kilogram.
         outwards = shift_slope(matter) @ matter[1:4] / np.linalg.norm(matter[1:4])
         own[index : index + 10] += theta[2] * outwards
+        # Sum of the shares (b - 1) + b + (1 - 2 b) = 0: the declared weight is kept.
         return case.needed(theta[0] * ((theta[1] - 1) * own + theta[1] * other + (1 - 2 * theta[1]) * rest))
 
     def in_body(self, case: Case) -> Array:

@@ -94,6 +94,7 @@ def weight_ratio(trial: Trial, mass: float) -> float | None:
     vertical = np.sum([plate.wrench.value[:, 2] for plate in trial.plates], axis=0)
     if not vertical.size or not np.nanmax(np.abs(vertical)) > 0:
         return None
+    # Quartiles of the loaded samples: a steady whole is one in which they agree.
     low, middle, high = np.nanpercentile(vertical[np.abs(vertical) > 0.1 * np.nanmax(np.abs(vertical))], [25, 50, 75])
     return float(middle / (mass * STANDARD_GRAVITY)) if middle > 0 and (high - low) < _EVEN * middle else None
 

@@ -92,6 +92,7 @@ def _left_out(case: Case) -> float:
         wrong = use & ~believable(case.body, fit, standing_point((fit,)))[0].use
     except BiodanceError:
         return 0.0
+    # Too large in the vertical force: a difference in moments has no sign that tells of a chair.
     large = wrong & (np.abs(case.residual[:, 2]) > case.trial.settings.outlier * np.median(case.predicted[:, 2]))
     one_sided = large.any() and np.mean(case.residual[large, 2] < 0) > _ONE_SIDED
     return 0.0 if one_sided else float(wrong.sum() / use.sum())

@@ -60,6 +60,7 @@ class WobblingMass(Effect):
         """Return the wrench per kilogram of the mass's motion relative to the bone."""
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 10]
+        # The mass hangs at the segment's centre of mass, h / m.
         place, acceleration = point_motion(case, index, table[1:4] / table[0])
         moved = relative_motion(
             acceleration, case.motion.rate, frequency=_FREQUENCY.get(self.target, LIMBS), damping=_DAMPING

@@ -118,6 +118,7 @@ class LoadSearch:
     @property
     def set(self) -> tuple[str, ...]:
         """Segments, most probable first, that hold 95 % of the probability of a load."""
+        # Probabilities of a load alone, without "no load": they sum to one over the segments.
         share = np.cumsum([s.probability for s in self.suspects]) / sum(s.probability for s in self.suspects)
         return tuple(s.segment for s in self.suspects[: int(np.searchsorted(share, 0.95)) + 1])
 
@@ -150,6 +151,8 @@ def added_mass(
         _Judged.of(session.data, units, one) for one in unloaded_bodies(tables, weighed=reference is not None)
     )
     none = np.array([one.log_none for one in bodies])
+    # (rivals, segments, masses): evidence of each body without load, times the likelihood
+    # ratio, prior of mass and segment.
     load = np.array([one.log_none + one.log_ratio for one in bodies]) + log_mass_prior(MASSES) - np.log(len(units))
     total = logsumexp(np.append(load.ravel(), none))
     log_none = float(logsumexp(none) - total)
@@ -174,10 +177,12 @@ class _Judged:
     def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], rival: UnloadedBody) -> "_Judged":
         before = rival.before
         rows, innovation, evidence = whiten_innovation(data, before)
+        # A body whose declared mass holds the load is lighter by phi / M per kilogram of it.
         less = float(rival.holds) * rows @ before.phi / before.mass.sum()
         columns = (rows[:, 10 * i : 10 * i + 10] for i in range(len(units)))
         views = tuple(LoadView.of(part, innovation, unit, less) for part, unit in zip(columns, units, strict=True))
         ratio = np.array([view.log_ratio(MASSES) for view in views])
+        # The evidence without its data term: - sum log L_kk, for data that are imagined (`_smallest`).
         log_det = evidence + 0.5 * float(innovation @ innovation)
         return cls(rival.log_prior, rival.log_prior + evidence, log_det, views, ratio)
 
@@ -186,13 +191,16 @@ def _suspect(segment: str, i: int, bodies: tuple[_Judged, ...], load: Array, non
     """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
     chance = float(logsumexp(load))
     size = load + np.array([one.views[i].log_place_information(MASSES) for one in bodies])
+    # Jeffreys' weights change the masses within a rival, not how probable the rival is.
     size += (logsumexp(load, axis=1) - logsumexp(size, axis=1))[:, None]
     here = np.exp(size - np.logaddexp(chance, none))
     posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))
     place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
     if posterior.interval[0] > 0:
+        # The place under the most probable rival; its masses are integrated over.
         likely = int(np.argmax(here.sum(axis=1)))
         place, place_sd = bodies[likely].views[i].place(here[likely])
+    # Each segment had 1 / n of the prior of a load: log n takes it out of the ratio.
     bayes = chance - none + float(np.log(len(bodies[0].views)))
     return LoadCandidate(segment, posterior, place, place_sd, bayes, float(np.exp(chance)), _smallest(bodies, i))
 
@@ -205,10 +213,12 @@ def _smallest(bodies: tuple[_Judged, ...], i: int) -> float:
     nothing = np.array([one.log_prior + one.log_det for one in bodies])
 
     def announced(true: float) -> bool:
+        # Imagined data y = true b: - y'y / 2 in units in which "no load" has unit variance.
         none = nothing - 0.5 * true**2 * squares
         load = none[:, None] + log_ratio_if(true, _COARSE, squares, own, wide)
         left = logsumexp(none)
         return bool(left - np.logaddexp(left, logsumexp(load + prior)) < np.log(_THRESHOLD))
 
+    # Announced from some mass on: bisection over an increasing list of booleans.
     at = bisect_left(range(len(_TRUE)), True, key=lambda step: announced(float(_TRUE[step])))
     return float(_TRUE[at]) if at < len(_TRUE) else float("inf")

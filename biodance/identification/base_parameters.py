@@ -84,6 +84,7 @@ def base_parameters(triangle: Array, names: tuple[str, ...]) -> BaseParameters:
     for column in order:
         vector = triangle[:, column]
         rest = vector - basis @ (basis.T @ vector)
+        # Gram-Schmidt twice: after one pass rounding leaves parts along the basis.
         rest = rest - basis @ (basis.T @ rest)
         size = np.linalg.norm(rest)
         if scale[column] > _DEPENDENT * largest and size > _DEPENDENT * scale[column]:
@@ -92,6 +93,8 @@ def base_parameters(triangle: Array, names: tuple[str, ...]) -> BaseParameters:
     kept.sort()
     regroup: Array = np.zeros((len(kept), triangle.shape[1]))
     if kept:
+        # W = W_b beta in the least-squares sense; columns kept give unit vectors, so phi_b +
+        # beta phi_d = regroup phi.
         solution = np.asarray(np.linalg.lstsq(triangle[:, kept], triangle, rcond=None)[0])
         solution[np.abs(solution) < 1e-9] = 0.0
         regroup = solution
@@ -117,6 +120,7 @@ def structural_base(body: Body, *, seed: int = 0) -> BaseParameters:
         np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv))
     )
     W = regressor_of(segment_motion(body, motion), gravity=body.gravity, sharing=body.sharing)
+    # The rank of W is that of its triangle: QR keeps W'W.
     return base_parameters(fold(W.reshape(-1, W.shape[2])), parameter_names(body))
 
 
@@ -154,15 +158,19 @@ def estimate_base(data: Information, base: BaseParameters) -> BaseEstimate:
     """
     columns = list(base.columns)
     Wb = data.triangle[:, columns]
+    # Columns of unit length: kg, kg·m and kg·m² else decide what counts as a small singular value.
     scale = np.linalg.norm(Wb, axis=0)
     scale[scale <= _UNEXCITED**2 * scale.max(initial=0.0)] = 1.0  # never moved: an unknown direction, not a tiny one
     U, s, Vt = np.linalg.svd(Wb / scale, full_matrices=False)
     good = s > _UNEXCITED * s.max(initial=0.0)
     rank = int(good.sum())
+    # Pseudo-inverse V S^+ U' of the scaled columns; the scale is divided out of the value afterwards.
     inverse = np.where(good, 1 / np.where(good, s, 1.0), 0.0)
     value = (Vt.T * inverse) @ (U.T @ data.target) / scale
+    # Whitened data: covariance (W_b'W_b)^-1 = V S^-2 V' between the scales.
     half = (Vt.T * inverse) / scale[:, None]
     covariance = half @ half.T
+    # A parameter with a part in the null space may be anything, whatever its finite part.
     unknown = (np.abs(Vt[~good]) > 1e-6).any(axis=0) if rank < len(columns) else np.zeros(len(columns), dtype=bool)
     sd = np.where(unknown, np.inf, np.sqrt(np.diag(covariance)))
     condition = float(np.linalg.cond(Wb)) if rank == len(columns) else float("inf")

@@ -59,9 +59,13 @@ def undiluted(total: Statistics, phi: Array, known: Information, table: Sip) -> 
     for band in np.flatnonzero((np.array(total.layout.bands.edges[:-1]) >= _FAST) & (total.count > 0)):
         turn = np.zeros((6, *learned.shape))
         for channel, square in enumerate(total.own[band]):
+            # A part whose wrench is W (parts * phi): one column for each gain.
             gain = _gains(square, parts * phi, int(total.count[band]))
+            # Columns times gain are columns plus (gain - 1); segments of no part and the target stay.
             lost = np.append(np.where(parts.any(axis=0), gain @ parts - 1.0, 0.0), 0.0)
+            # X turn (phi, -1) = W (phi + lost * what can be known of phi) - y: each channel has its own gains.
             turn[channel] = np.eye(len(lost)) + lost[:, None] * learned
+        # X_c'X_d per pair of channels becomes turn_c' (X_c'X_d) turn_d.
         gram[band] = turn[PAIRS[0]].swapaxes(1, 2) @ gram[band] @ turn[PAIRS[1]]
     return Statistics(gram, total.count, total.layout)
 
@@ -78,7 +82,9 @@ def _learned(known: Information, table: Sip) -> Array:
     """
     spread = table.covariance @ known.triangle.T
     learned, nothing = np.eye(len(table.phi) + 1), _NOTHING * np.eye(len(spread))
+    # P R' (R P R' + eps)^-1 R: what least squares with the table as prior gives back of true parameters.
     share = spread @ np.linalg.solve(known.triangle @ spread + nothing, known.triangle)
+    # With (phi, -1): share phi - (share phi0 - phi0) = phi0 + share (phi - phi0).
     learned[:-1, :-1], learned[:-1, -1] = share, share @ table.phi - table.phi
     return learned
 
@@ -102,9 +108,12 @@ def _gains(gram: Array, parts: Array, count: int) -> Array:
     """Return the gains (G,) of the wrenches that ``parts`` (G, p) of the body are predicted to need, from the second
     moments (p + 1, p + 1) of [W y] in one channel.
     """
+    # Normal equations of y on the parts' wrenches: q_ij = (W phi_i)'(W phi_j), seen_i = (W phi_i)'y.
     square, seen = parts @ gram[:-1, :-1] @ parts.T, parts @ gram[:-1, -1]
     left = gram[-1, -1] - seen @ np.linalg.lstsq(square, seen, rcond=None)[0]
+    # Mean square of what the unconstrained fit leaves, never zero: relative and absolute floor.
     noise = max(float(left), 1e-9 * float(gram[-1, -1])) / count + 1e-12
+    # Ridge towards a gain of 1: prior N(1, _SPREAD²) adds 1 / _SPREAD² to precision and target.
     precision = square / noise + np.eye(len(parts)) / _SPREAD**2
     return np.clip(np.linalg.solve(precision, seen / noise + 1.0 / _SPREAD**2), 0.0, 1.0)
 
@@ -156,6 +165,7 @@ def undo_dilution(
         posterior = find_posterior(now.data, table)
         real = undiluted(total, _with_probable_load(posterior, now.data, loads).mean, known, table)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN), found, room)
+        # Gains are measured under these parameters: where they move them far, one stands in for the other.
         if gains_move_masses(posterior, find_posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
     return now

@@ -30,6 +30,8 @@ class Information:
         """
         scale = np.sqrt(np.maximum(np.diag(H), 1e-300))  # a square root of H in units of its diagonal, then R of it
         value, vector = np.linalg.eigh(H / np.outer(scale, scale))
+        # D^-1 H D^-1 = V E V' with D = diag(scale): rows E^1/2 V' D have rows'rows = H, also
+        # where H is nearly singular.
         rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
         return cls(np.asarray(np.linalg.qr(rows, mode="r")), frames)
 
@@ -55,7 +57,9 @@ class Information:
 
 def fold(rows: Array, onto: Array | None = None) -> Array:
     """Return the upper triangle (n, n) of the QR factorisation of ``onto`` stacked over ``rows`` (m, n)."""
+    # R'R = onto'onto + rows'rows: the triangle holds all that least squares needs of both.
     stacked = rows if onto is None else np.concatenate([onto, rows])
     triangle: Array = np.asarray(np.linalg.qr(stacked, mode="r"))
+    # Fewer rows than columns: zero rows make the triangle square.
     missing = rows.shape[1] - triangle.shape[0]
     return np.pad(triangle, ((0, missing), (0, 0))) if missing > 0 else triangle

@@ -69,12 +69,16 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
     mass, h = phi[0], phi[1:4]
     com = h / mass
     value = np.concatenate([[mass], com, np.empty(6)])
+    # d phi / d phi; rows of CoM and inertia are overwritten or added to.
     slope = np.eye(10)
     slope[1:4, 1:4] = np.eye(3) / mass
+    # d(h / m) / dm = -h / m².
     slope[1:4, 0] = -com / mass
     for row, (i, j) in enumerate(TENSOR, start=4):
         same = float(i == j)
+        # Parallel axes: I - m (|c|² 1 - c c')_ij, with h = m c.
         value[row] = phi[row] - (same * (h @ com) - h[i] * com[j])
+        # d/dm of -(h.h 1 - h h') / m at constant h.
         slope[row, 0] = same * (com @ com) - com[i] * com[j]
         slope[row, 1:4] = -2 * same * com
         slope[row, 1 + i] += com[j]
@@ -101,6 +105,7 @@ def knowledge(after: Sip, before: Sip, posterior: BodyPosterior | None = None) -
             _deviation(slope, after.covariance[cut, cut]),
             _deviation(table_slope, before.covariance[cut, cut]),
         )
+        # Before and after the data both by the table's slope: their ratio is not that of two linearisations.
         left, whole = (_deviation(table_slope, c[cut, cut]) for c in (then, first))
         share = np.clip(1 - np.divide(left**2, whole**2, out=np.ones(10), where=whole > 0), 0.0, 1.0)
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
@@ -151,6 +156,7 @@ def known_together(sip: Sip) -> tuple[Together, ...]:
         if not set(names) <= set(sip.segments):
             continue
         at = [10 * sip.segments.index(name) for name in names]
+        # Variance of a sum: the sum of all elements; the trace, if nothing were shared.
         cov = np.asarray(sip.covariance)[np.ix_(at, at)]
         sd, alone = float(np.sqrt(max(cov.sum(), 0.0))), float(np.sqrt(np.trace(cov)))
         if sd < alone:

@@ -23,6 +23,7 @@ def segments_beyond(body: Body, segment: str) -> tuple[int, ...]:
     """Return the indices of ``segment`` and of all segments that hang on it."""
     own, parents = body.segment_joint, [joint.parent for joint in body.joints]
     first, found = own[body.segment_index(segment)], []
+    # Walks up to the joint that carries `segment`: what reaches it hangs on it.
     for index, joint in enumerate(own):
         while joint > first:
             joint = parents[joint]
@@ -55,6 +56,7 @@ def _opened(body: Body, table: Sip, segment: str) -> Sip:
     rest = table.phi * ~np.repeat(np.isin(np.arange(len(body.segments)), limb), 10)
     for index in limb:
         own = slice(10 * index, 10 * index + 10)
+        # The segment heavier by a share of itself, the rest of the body lighter by as much: total unchanged.
         less = -table.phi[10 * index] * rest / rest[::10].sum()
         less[own] = table.phi[own]
         covariance += share**2 * np.outer(less, less)
@@ -75,6 +77,7 @@ def with_devices(body: Body, worn: Mapping[str, float]) -> Body:
 
 
 def _wearing(body: Body, table: Sip, worn: Mapping[str, float], carried: float) -> Sip:
+    # The person without what is worn: lighter in proportion, covariance with the square.
     ratio = 1 - carried / float(table.mass.sum())
     phi, covariance = ratio * table.phi, ratio**2 * np.asarray(table.covariance)
     for segment, mass in worn.items():
@@ -82,6 +85,7 @@ def _wearing(body: Body, table: Sip, worn: Mapping[str, float], carried: float) 
         own = slice(10 * index, 10 * index + 10)
         mean, factor = unit_load(body, index)
         phi[own] += mass * mean
+        # A load of m kg: mean m u, covariance m² G G'.
         covariance[own, own] += mass**2 * factor @ factor.T
     return replace(table, phi=phi, covariance=covariance)
 

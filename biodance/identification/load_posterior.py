@@ -44,6 +44,7 @@ class LoadPosterior:
     @property
     def sd(self) -> float:
         """Standard deviation of the load, kg."""
+        # E[m²] - E[m]².
         return float(np.sqrt(max(float(self.weight @ MASSES**2) - self.mass**2, 0.0)))
 
     @property
@@ -53,6 +54,7 @@ class LoadPosterior:
         return low, high
 
     def _quantile(self, share: float) -> float:
+        # Distribution function at the middle of each cell; the mass `none` sits at zero.
         below = self.none + np.cumsum(self.weight) - 0.5 * self.weight
         return float(np.interp(share, np.append(self.none, below), np.append(0.0, MASSES), left=0.0))
 
@@ -82,7 +84,9 @@ class LoadView:
         it.
         """
         mean, factor = unit
+        # Mean of a load's data per kg, and what its unknown place adds; (r,) and (r, k).
         b, D = columns @ mean - less, columns @ factor
+        # In the eigenvectors of D'D the covariance 1 + m² D D' is diagonal on the directions of D.
         strength, basis = np.linalg.eigh(D.T @ D)
         D = D @ basis
         return cls(
@@ -110,9 +114,11 @@ class LoadView:
         """
         m = MASSES[:, None]
         narrow = 1 / (1 + m**2 * self.strength)
+        # E[z | m, y] = m (D'y - m D'b) / (1 + m² w) per direction, turned into metres by `ways`.
         place = self.mean[1:4] + (m * narrow * (self.surprise - m * self.unit)) @ self.ways[1:4].T
         share = weight / weight.sum()
         mean = share @ place
+        # Law of total variance over the masses: var(z | m) = 1 / (1 + m² w), plus that of the means.
         return mean, np.sqrt(share @ (narrow @ (self.ways[1:4] ** 2).T + (place - mean) ** 2))
 
 
@@ -121,6 +127,7 @@ def log_ratio_if(true: float, masses: Array, squares: Array, own: Array, wide: A
     a load of ``true`` kg at the mean place and nothing else; ``squares`` (r,) b'b, ``own`` and ``wide`` (r, n) of each
     view `at_the_mean`.
     """
+    # y = true b: m b'y - m² b'b / 2 = (true m - m² / 2) b'b.
     shown = np.multiply.outer(squares, true * masses - 0.5 * masses**2)
     return np.asarray(shown + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide))
 
@@ -128,11 +135,13 @@ def log_ratio_if(true: float, masses: Array, squares: Array, own: Array, wide: A
 def _log_ratio(m: Array, shown: float, squares: float, surprise: Array, unit: Array, strength: Array) -> Array:
     """Return log N(y; m b, 1 + m² D D') - log N(y; 0, 1) for masses ``m`` (n, 1)."""
     wide = 1 + m**2 * strength
+    # Woodbury for the quadratic form, determinant lemma for log|1 + m² D D'| = sum log(1 + m² w).
     spread = (m * (surprise - m * unit)) ** 2 / wide - np.log(wide)
     return np.asarray(m[:, 0] * shown - 0.5 * m[:, 0] ** 2 * squares + 0.5 * spread.sum(axis=1))
 
 
 def log_mass_prior(masses: Array) -> Array:
     """Return the log probability (n,) of each of ``masses`` (n,) kg, given that there is a load."""
+    # Half normal density times the width of each mass's cell (the masses are spaced geometrically).
     log = -0.5 * (masses / _USUAL) ** 2 + np.log(np.gradient(masses))
     return np.asarray(log - np.log(np.exp(log).sum()))

@@ -32,6 +32,7 @@ def load_moments(body: Body, segment: int) -> Array:
     segment's box.
     """
     loads = _unit_loads(body, segment) * _SCALE
+    # Second moment about zero, not the covariance: that there is a load at all is unknown.
     return _factor(loads.T @ loads / len(loads))
 
 
@@ -56,6 +57,7 @@ def _factor(moment: Array) -> Array:
     """Return U (10, k) with U U' = ``moment`` (10, 10), without directions of no size."""
     value, vector = np.linalg.eigh(moment)
     keep = value > 1e-12 * value.max()
+    # V E^1/2: directions of no size would be zero columns.
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
 
 
@@ -106,7 +108,9 @@ def nearest_segment(body: Body, motions: Sequence[Motion], segment: str, place: 
     q = np.concatenate([one.q[:: max(1, len(one.q) // _FRAMES)] for one in motions])
     pose, own = poses(body, q), body.segment_index(segment)
     point, n = pose.points([own], place[None]), len(body.segments)
+    # R'(point - origin) in every segment's axes: sum over j of R[t, s, j, i] d[t, s, j].
     local = np.einsum("tsji,tsj->tsi", pose.rotation[:, :n], point - pose.position[:, :n])
     low, high = np.moveaxis(body.boxes, 1, 0)
+    # Distance outside a box: per axis what lies beyond either side, zero inside.
     far = np.linalg.norm(np.maximum(0.0, np.maximum(low - local, local - high)), axis=2).mean(axis=0)
     return segment if far[own] <= far.min() else body.segments[int(np.argmin(far))]

@@ -87,13 +87,16 @@ def mismatch(
     products = np.zeros((asked, size + found.plates.shape[1] + doubts + 1))
     for fit, pick in long_runs(fits, noise.bands):
         motion = fit.motion.at(pick)
+        # Noise at the rate of this trial's thinned samples.
         white = noise.at(fit.motion.rate)
         beside = fit.doubts[pick] if fit.doubts.size else np.zeros((pick.size, 6, doubts))
         rows = np.concatenate([*_rows(body, motion, white, beside), fit.wrench.value[pick][:, :, None]], axis=2)
         weight = white.weighted(rows[:, :, :asked])
+        # Sums over frames and channels of (S^-1 row)' row: W'S^-1 [W E doubts y].
         products += np.tensordot(weight, rows, axes=((0, 1), (0, 1)))
         del rows  # a half of what a long run keeps
         scores += transpose(sources, Response.of(whole, motion), weight).T
+    # Soft tissue belongs to no joint; joint centres and hinges keep their sizes.
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = softness(body, fits, noise.bands) if softer is None else softer
     scores *= np.where(soft, more, 1.0) * deviations(whole, sources)
@@ -107,6 +110,7 @@ def _rows(body: Body, motion: Motion, noise: Noise, doubts: Array) -> tuple[Arra
     """
     links = regressor_of(segment_motion(body, motion), gravity=body.gravity)
     W = links if body.sharing is None else links @ body.sharing
+    # Plates err on the wrench that the table's body needs: to first order any body near it.
     return W, plate_errors(W @ body.sip.phi, motion.rate, noise, plate_sources()), doubts, links @ share_errors(body)
 
 
@@ -123,6 +127,7 @@ def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
         if residual.shape[1] and np.isfinite(residual).any():
             few = pick[:: min(every, max(1, pick.size // 2))]
             trial = Response.of(whole, fit.motion.at(few))
+            # Mean square distances add over independent sources: sum of variance times unit square.
             predicted += float(variance @ np.concatenate([source.squares(trial) for source in sources])) * pick.size
             observed += float(np.nanmean(residual**2)) * pick.size
     return float(np.sqrt(max(1.0, observed / predicted))) if predicted > 0 else 1.0
@@ -158,6 +163,7 @@ def share_errors(body: Body) -> Array:
         _, origin = body.place_on_segment(body.segment_joint[count + k])
         for error in _part_errors(part.name, phi[own]).T:
             column = np.zeros(len(phi))
+            # The rest of the segment loses what the part gains, seen from the segment's origin.
             column[own], column[rest] = error, -shift_matter(origin) @ error
             columns.append(column)
     return np.array(columns).T
@@ -179,17 +185,21 @@ def covariance(H: Array, found: Mismatch, sizes: Sizes) -> Array:
 
 def evident_sizes(data: Information, found: Mismatch, prior: Sip) -> Sizes:
     """Return the sizes of the disturbances under which the session's data are most probable, given the table."""
+    # b = W'S^-1 y has the covariance H under unit noise: in a basis with B H B' = 1 that is 1.
     H = data.triangle.T @ data.triangle
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     value, vector = np.linalg.eigh(H / np.outer(scale, scale))
     keep = value > 1e-9 * value.max()
+    # Directions that the data hardly show are left out before they are divided by their size.
     basis = (vector[:, keep] / np.sqrt(value[keep])).T / scale
     e = basis @ (data.triangle.T @ (data.target - data.triangle @ prior.phi))
+    # The table's covariance through b = H phi: B H P H B'.
     spread = basis @ H @ prior.covariance @ H @ basis.T
     moved, wrong = (basis @ scores for scores in (found.kinematics, found.plates))
     M, P = moved @ moved.T, spread + wrong @ wrong.T
     best, chosen = -np.inf, Sizes(1.0, 1.0)
     for kinematics in KINEMATICS:
+        # One eigendecomposition for all noise factors, which only add to the eigenvalues.
         value, vector = np.linalg.eigh(kinematics**2 * M + P)
         turned = (vector.T @ e) ** 2
         for noise in _NOISE:
@@ -205,16 +215,19 @@ def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
     """
     R = data.triangle
     H = R.T @ R
+    # Half' half = C^+: generalised least squares on b = H phi.
     half = inverse_root(covariance(H, found, sizes))
     rows = np.linalg.qr(np.column_stack([half @ H, half @ (R.T @ data.target)]), mode="r")
     triangle = np.zeros_like(data.R)
     triangle[: len(rows)] = rows
+    # The misfit that no parameter explains stays beside what this triangle leaves.
     triangle[-1, -1] = np.hypot(triangle[-1, -1], data.R[-1, -1])
     return Information(triangle, data.frames)
 
 
 def inverse_root(C: Array) -> Array:
     """Return X (k, p) with X' X = C^+ of a covariance ``C`` (p, p), directions that nothing moves left out."""
+    # Units of the diagonal: otherwise masses would decide which directions are nothing.
     scale = np.sqrt(np.maximum(np.diag(C), 1e-300))
     value, vector = np.linalg.eigh(C / np.outer(scale, scale))
     keep = value > 1e-13 * value.max()

@@ -53,6 +53,7 @@ def directions() -> Array:
     """Return `DIRECTIONS` unit vectors (D, 3), spread evenly over the half sphere (golden spiral; v and -v say the
     same).
     """
+    # Equal areas: z uniform on the half sphere, angle in golden steps.
     z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
     angle = np.arange(DIRECTIONS) * np.pi * (3 - np.sqrt(5))
     radius = np.sqrt(1 - z**2)
@@ -72,15 +73,18 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
     v = directions()
     sampled = np.zeros((DIRECTIONS, 10))
     for column, (i, j) in enumerate(TENSOR, start=4):
+        # v'I v = sum of v_i v_j I_ij: products of inertia count twice.
         sampled[:, column] = v[:, i] * v[:, j] * (1 if i == j else 2)
     for s, name in enumerate(body.segments):
         block = np.zeros((7 + DIRECTIONS, 10))
         block[0, 0] = 1.0
+        # h - m low >= 0 and m high - h >= 0: CoM in its box, linear in the parameters.
         block[1:4, 1:4], block[1:4, 0] = np.eye(3), -body.com_boxes[s, 0]
         block[4:7, 1:4], block[4:7, 0] = -np.eye(3), body.com_boxes[s, 1]
         block[7:] = sampled
         wide = np.zeros((len(block), 10 * len(body.segments)))
         wide[:, 10 * s : 10 * s + 10] = block
+        # Smallest eigenvalue first, as `eigvalsh` sorts.
         eps = RELATIVE_EPS * max(float(np.linalg.eigvalsh(_tensor(body.sip.of(name)))[0]), 0.0)
         rows.append(wide)
         level.append(np.concatenate([np.zeros(7), np.full(DIRECTIONS, eps)]))
@@ -160,6 +164,7 @@ def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array |
     import cvxpy as cp
 
     count = data.triangle.shape[1]
+    # |R phi - r|² + |phi - phi0|² as one triangle U: the cost is |U (phi - centre)|² plus a constant.
     stacked = np.concatenate(
         [np.column_stack([data.triangle, data.target]), np.column_stack([np.eye(count), body.sip.phi])]
     )
@@ -173,6 +178,7 @@ def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array |
         if len(matrix) == 0:
             continue
         slope = matrix @ inverse
+        # Rows of unit length: no constraint is large by its units.
         scale = 1 / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
         left, right = scale[:, None] * slope @ x, scale * (level - matrix @ centre)
         constraints.append(left == right if equal else left >= right)

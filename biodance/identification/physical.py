@@ -42,12 +42,14 @@ def shortest_inside(matrices: Sequence[tuple[Array, Array]], slope: Array, level
     rows, right, cones = [-slope], [level], [clarabel.NonnegativeConeT(len(level))]
     for M, m in matrices:
         j, i = np.tril_indices(len(m))  # the upper triangle, column by column
+        # svec: off-diagonals times sqrt(2), so that the inner product of vectors is that of matrices.
         weight = np.where(i == j, 1.0, np.sqrt(2.0))
         rows.append(-weight[:, None] * M[i, j])
         right.append(weight * m[i, j])
         cones.append(clarabel.PSDTriangleConeT(len(m)))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    # The solver halves x'P x: P = 2 makes it |x|².
     twice = csc_matrix(2.0 * eye_array(count))
     A, b = csc_matrix(np.concatenate(rows)), np.concatenate(right)
     found = clarabel.DefaultSolver(twice, np.zeros(count), A, b, cones, settings).solve()
@@ -147,6 +149,7 @@ class _Limits:
         """Return how far (N,) every segment of ``phi`` (10N,) is inside its limits; negative: no possible body, or
         CoM outside.
         """
+        # A matrix inside its cone has a smallest eigenvalue above zero; CoM by its nearest side of the box.
         ten = phi.reshape(-1, 10, 1)
         inside = np.linalg.eigvalsh((self.cone @ ten).reshape(-1, 4, 4) - self.floor)[:, 0]
         return np.asarray(np.minimum(inside, (self.sides @ ten)[..., 0].min(axis=1)))
@@ -155,11 +158,14 @@ class _Limits:
 def _limits(prior: Sip, body: "Body") -> _Limits:
     """Return the limits of ``body`` with the units and the floors of ``prior``."""
     size = np.abs(np.diagonal(pseudo_inertia(prior.phi), axis1=1, axis2=2))
+    # A rod or plate has a second moment of nearly nothing: its unit is bounded from below.
     second = np.maximum(size[:, :3], THIN * size[:, :3].max(axis=1, keepdims=True))
     unit = 1 / np.sqrt(np.maximum(np.column_stack([second, size[:, 3]]), 1e-9))
+    # Congruence D J D with D = diag(unit): definite where J is, eigenvalues comparable between segments.
     weight = unit[:, :, None] * unit[:, None, :]
     least = RELATIVE_FLOOR * np.maximum(smallest_eigenvalues(prior.phi), 0.0)
     pick = np.eye(10)[1:4]
+    # h - m side per axis; times 1 / m (unit of J's last element, squared) it is a distance in metres.
     low, high = (pick - side[:, :, None] * np.eye(10)[0] for side in (body.com_boxes[:, 0], body.com_boxes[:, 1]))
     sides = np.concatenate([low, -high], axis=1) * unit[:, 3, None, None] ** 2
     return _Limits(weight.reshape(-1, 16, 1) * PSEUDO_INERTIA, least[:, None, None] * np.eye(4) * weight, sides)
@@ -173,6 +179,7 @@ def _nearest(posterior: BodyPosterior, limits: _Limits, bound: NDArray[np.intp])
     solver stops, it is asked again in units of the distance to the prior.
     """
     rows = (10 * bound[:, None] + np.arange(10)).ravel()
+    # The least |x| has no part that the bound segments do not see: x = Q z.
     span = np.linalg.qr(posterior.factor[rows].T)[0]
     local, mean = posterior.factor[rows] @ span, posterior.mean[rows]
     far = float(np.linalg.norm(np.linalg.lstsq(local, posterior.prior.phi[rows] - mean)[0]))
@@ -196,7 +203,9 @@ def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) 
     for k, i in enumerate(bound):
         slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
         free = _free_axes(limits.cone[i] @ np.column_stack([slope, level]))
+        # F J F' as a vector: (F kron F) vec J.
         axes, count = np.kron(free, free), len(free)
+        # A little inside the cone: the solver's answer is then inside in spite of its tolerance.
         least = axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
         inside = (axes @ limits.cone[i] @ slope, axes @ limits.cone[i] @ level - least)
         matrices.append((inside[0].reshape(count, count, -1), inside[1].reshape(count, count)))
@@ -211,5 +220,6 @@ def _free_axes(matrices: Array) -> Array:
     Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and
     needs no limit.
     """
+    # The (16, k) matrices below each other as rows of length 4: right singular vectors are the axes they act on.
     _, size, axes = np.linalg.svd(matrices.T.reshape(-1, 4))
     return np.asarray(axes[size > _NOTHING * size.max()])

@@ -57,10 +57,12 @@ def _at(body: Body, mass: float, *, along: bool) -> Sip:
     covariance = np.array(table.covariance)
     for i in (body.segment_index("pelvis"), trunk):
         cut = slice(10 * i, 10 * i + 10)
+        # A shift along the spine by `way`: matter's first order, one direction.
         slope = way * shift_slope(table.phi[cut])[:, _ALONG]
         covariance[cut, cut] += np.outer(slope, slope)
     other = widened_prior(replace(table, covariance=covariance), body.joint_errors)
     ratio = mass / float(other.mass.sum())
+    # phi scales with the mass, its covariance with the square.
     return replace(other, phi=ratio * other.phi, covariance=ratio**2 * np.asarray(other.covariance))
 
 
@@ -70,6 +72,7 @@ def with_sides(table: Sip, *, apart: bool) -> Sip:
     before. Masses that the person's own shape told stay as they are.
     """
     alike = error_size("left_right_correlation", "mass")
+    # var((m_r - m_l) / 2) is s² (1 - rho) / 2 for alike sides, s² / 2 apart: more by rho / (1 - rho), back by -rho.
     more, sign = alike / (1 - alike) if apart else -alike, np.array([1.0, -1.0])
     covariance = np.array(table.covariance)
     for i, name in enumerate(table.segments):
@@ -77,9 +80,11 @@ def with_sides(table: Sip, *, apart: bool) -> Sip:
         if other == name or name in table.measured or other not in table.segments:
             continue
         at = 10 * np.array([i, table.segments.index(other)])
+        # Variance of the half difference.
         unsure = sign @ table.covariance[np.ix_(at, at)] @ sign / 4
         way = np.zeros(len(table.phi))
         for k, one in zip(at, sign, strict=True):
+            # One kg from left to right: each side's parameters in proportion to its mass.
             way[k : k + 10] = one * table.phi[k : k + 10] / max(float(table.phi[k]), 1e-12)
         covariance += more * unsure * np.outer(way, way)
     return replace(table, covariance=covariance)
@@ -115,6 +120,7 @@ def more_probable_table(data: Information, tables: PossibleTables, body: Body) -
     words.
     """
     evidence = {choice: find_posterior(data, one).log_evidence for choice, one in tables.items()}
+    # Sides apart need so much more evidence.
     along, apart = best = max(evidence, key=lambda choice: evidence[choice] - ODDS * choice[1])
     words = []
     if (not along, apart) in tables:

@@ -58,6 +58,7 @@ class PlateReadings(Sendable):
         where nothing is sure.
         """
         frames = np.concatenate([self.rows(fit, body)[fit.use] for fit in fits])
+        # Mean over the frames, then about the plates' point.
         rows = self.layout.shift @ frames.mean(axis=0)
         mean = rows @ self.size
         sd = np.sqrt(np.diag(rows @ self.covariance @ rows.T))
@@ -90,6 +91,7 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) 
     rows, told = _rows(found, used, found.noise), []
     for body in bodies:
         first = _readings(found, rows, body)
+        # What the plates read is taken off before the noise is learned again.
         off = tuple(replace(f, wrench=Wrench(f.wrench.time, f.wrench.value - first.added(f, body))) for f in used)
         left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
         moments = left.moments(body.sip.phi, found.posterior.covariance)
@@ -109,9 +111,12 @@ def _readings(found: Identification, rows: PlateRows, body: Body) -> PlateReadin
     """Return what the ``rows`` tell of the plates beside a ``body``."""
     phi, H, sizes = body.sip.phi, rows.normal, found.sizes
     half = inverse_root(sizes.noise * H + sizes.kinematics**2 * rows.kinematics @ rows.kinematics.T)
+    # half r with r = H (phi, z) + errors: columns of parameters and of plates, in units of the errors.
     of_body, of_plates = np.split(half @ H, [len(phi)], axis=1)
+    # Posterior precision of z: data plus its unit-normal prior.
     after = np.linalg.inv(of_plates.T @ of_plates + np.eye(of_plates.shape[1]))
     gain = after @ of_plates.T
     slope = gain @ of_body
+    # var(z) = var(z | phi) + D C D' with D = -gain of_body.
     covariance = after + slope @ found.posterior.covariance @ slope.T
     return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, layout_for(found.noise.about))

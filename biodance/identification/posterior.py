@@ -67,6 +67,7 @@ def _factor_of(covariance: bytes) -> Array:
     safe = np.where(scale > 0, scale, 1.0)
     value, vector = np.linalg.eigh(table / np.outer(safe, safe))
     keep = value > 1e-12 * value.max(initial=0.0)
+    # S = D V E^1/2 with D^-1 P D^-1 = V E V'.
     factor = scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
     factor.setflags(write=False)
     return np.asarray(factor)
@@ -77,8 +78,11 @@ def mean_and_covariance(normal: Array, prior: Sip) -> tuple[Array, Array]:
     p + 1): what `find_posterior` returns, as exact as that matrix is.
     """
     S = prior_factor(prior)
+    # 1 + S'HS = L L': the posterior precision of u, never singular.
     lower = cholesky(S.T @ normal[:-1, :-1] @ S + np.eye(S.shape[1]), lower=True, check_finite=False)
+    # S'W'(y - W phi0) from the normal matrix alone.
     told = S.T @ (normal[:-1, -1] - normal[:-1, :-1] @ prior.phi)
+    # half'half = S (L L')^-1 S'.
     half = solve_triangular(lower, S.T, lower=True, check_finite=False)
     return prior.phi + S @ cho_solve((lower, True), told, check_finite=False), half.T @ half
 
@@ -89,13 +93,17 @@ def find_posterior(data: Information, prior: Sip) -> BodyPosterior:
     A = data.triangle @ S
     b = data.target - data.triangle @ prior.phi
     k = S.shape[1]
+    # Rows [A b; 1 0]: |A u - b|² + |u|² as one least-squares problem.
     stacked = np.zeros((A.shape[0] + k, k + 1))
     stacked[: A.shape[0], :k], stacked[: A.shape[0], k], stacked[A.shape[0] :, :k] = A, b, np.eye(k)
     triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
     U, target = triangle[:k, :k], triangle[:k, k]
     u = solve_triangular(U, target)
+    # Rest of the stacked target: the misfit at the minimum, penalty included; `data.misfit` is outside all columns.
     penalised = float(np.sum(triangle[k:, k] ** 2)) + data.misfit
+    # |A'A + 1|^1/2 = product of |U_kk|: Gaussian evidence with unit-normal u.
     log_evidence = -0.5 * penalised - float(np.sum(np.log(np.abs(np.diag(U)))))
+    # Covariance of phi = S U^-1 U^-T S'.
     factor = S @ solve_triangular(U, np.eye(k))
     chi2 = float(np.sum((A @ u - b) ** 2)) + data.misfit
     return BodyPosterior(prior, prior.phi + S @ u, factor, log_evidence, chi2, data.frames)

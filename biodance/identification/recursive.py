@@ -21,6 +21,7 @@ class RecursivePosterior:
         """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance due to the
         uncertainty of the parameters.
         """
+        # Diagonal of W C W' per sample: sum over j, k of W[i, j] C[j, k] W[i, k].
         return W @ self.mean, np.einsum("...ij,jk,...ik->...i", W, self.covariance, W, optimize=True)
 
     def updated(self, W: Array, wrench: Array, variance: Array) -> "RecursivePosterior":
@@ -29,7 +30,9 @@ class RecursivePosterior:
         Source: Kalman 1960, doi:10.1115/1.3662552, with a state that stays.
         """
         seen = self.covariance @ W.T
+        # K = C W'(W C W' + R)^-1; the innovation's covariance is symmetric, so K' solves it.
         gain = np.linalg.solve(W @ seen + np.diag(variance), seen.T).T
+        # C - K W C; rounding makes it unsymmetric, mended below.
         covariance = self.covariance - gain @ seen.T
         return replace(
             self,

@@ -65,6 +65,7 @@ def innovation(body: Body, one: RobotMotion) -> float:
     motion = one.fit.motion.at(pick)
     W = regressor(body, motion)
     left = one.fit.wrench.value[pick] - W @ body.sip.phi
+    # var(W phi) per channel, plus the start of the noise.
     allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(robot_start(body))
     return float(np.sqrt(np.mean(left**2 / allowed)))
 
@@ -100,6 +101,7 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
         found = estimate_base(total.information(noise), base)
         phi[list(base.columns)] = found.value
         left = total.moments(phi, np.zeros((phi.size, phi.size))).residual[0]
+        # Of count samples with six channels the base parameters take rank degrees of freedom, rank / 6 per channel.
         noise = replace(noise, covariance=np.diag(np.diag(left) / (total.count[0] - found.rank / 6))[None])
     return found
 
@@ -122,6 +124,7 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
             motion = fit.motion.at(pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
+            # Sum over frames and channels of W' S^-1 times what each error changes.
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))
             faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
             place += np.tensordot(weight, place_changes(wrench, one.grounded, pick), axes=((0, 1), (0, 1)))
@@ -197,6 +200,7 @@ def loads(body: Body, one: Grounded, measured: Array) -> Loads:
     torque[:, joints] = every[:, joints]
     size = np.sqrt(np.mean(torque**2, axis=0))
     left = np.cross([0.0, 0.0, 1.0], ahead)
+    # Moment about the sole's own axes: about its left axis it rocks forwards, about the one ahead sideways.
     give = [-np.einsum("ti,ti->t", pressed, axis) for axis in (left, ahead)]
     moment = np.sqrt(np.mean(np.square(give), axis=1))
     play = -np.tanh(torque / np.maximum(_TURNS * size, 1e-9))
@@ -236,6 +240,8 @@ def _needed(body: Body, motion: Motion) -> Array:
         row[:] = pin.rnea(model, data, q, v, a)[:6]
     turn = quaternion_matrix(motion.q[:, 3:7])
     force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (rows[:, :3], rows[:, 3:]))
+    # RNEA's first six are the root's wrench in its own axes about its origin: turned, then
+    # carried to the lab origin.
     return np.concatenate([force, moment + cross(motion.q[:, :3], force)], axis=1)
 
 
@@ -251,6 +257,7 @@ def place_changes(wrench: Array, one: Grounded, pick: "slice | np.ndarray" = sli
     force, moment = wrench[:, :3], wrench[:, 3:]
     whole = np.zeros((len(wrench), 6, 3))
     for k in range(2):
+        # Shift d of the frame: moment d x F. Turn by a small yaw: z x F, z x M.
         whole[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
     up = YAW * np.eye(3)[2]
     whole[:, :3, 2], whole[:, 3:, 2] = cross(up, force), cross(up, moment)
@@ -272,6 +279,7 @@ def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, 
         foot = body.feet[side]
         middle = foot.outline.mean(axis=0)
         soles.append(pose.rotation[:, foot.segment] @ middle + pose.position[:, foot.segment])
+        # Lab x as the foot sees it at rest, turned with the foot, seen from above.
         ahead = pose.rotation[:, foot.segment] @ (rest.rotation[0, foot.segment].T @ [1.0, 0.0, 0.0])
         flat = ahead * [1.0, 1.0, 0.0]
         aheads.append(flat / np.linalg.norm(flat, axis=1, keepdims=True))
@@ -286,5 +294,6 @@ def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, 
     names = [body.segments[body.feet[side].segment] for side in SIDES]
     torque = joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
     standing = np.arange(len(down))
+    # About the middle of each sole.
     pressed = [wrench_about_point(part.value, sole)[:, 3:] for part, sole in zip(parts, soles, strict=True)]
     return torque, np.array(pressed)[one.foot, standing], np.array(aheads)[one.foot, standing]

@@ -75,6 +75,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     mass = float(earlier.posterior.prior.mass.sum())
     tables = (scaled_to_mass(table_like(one, earlier), mass) for one in (earlier, later))
     first, second = (_with_room(*three) for three in zip(tables, (earlier, later), (later, earlier), strict=True))
+    # What both posteriors still owe to the common table: cov(e1, e2) = A1 P A2'.
     mutual = _prior_influence(first) @ earlier.posterior.prior.covariance @ _prior_influence(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
     values = [_possible(posterior, one) for posterior, one in ((first, earlier), (second, later))]
@@ -82,10 +83,12 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     for i, segment in enumerate(earlier.sip.segments):
         cut = slice(10 * i, 10 * i + 10)
         before, after = (segment_quantities(phi[cut]) for phi in values)
+        # One slope for the difference: the mean of both linearisations.
         slope = 0.5 * (before[1] + after[1])
         sd = np.sqrt(np.maximum(np.diag(slope @ spread[cut, cut] @ slope.T), 0.0))
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
             value = float(after[0][k] - before[0][k])
+            # Two-sided normal probability.
             p = float(2 * ndtr(-abs(value) / sd[k])) if sd[k] > 0 else 1.0
             informed = any(one.known[10 * i + k].verdict != "cannot be known" for one in (earlier, later))
             rows.append(Difference(segment, quantity, unit, value, float(sd[k]), p, informed))

@@ -89,6 +89,7 @@ class Statistics:
         band = self.layout.bands.at(rate).of(len(X))
         for b in np.unique(band[(band >= 0) & (band < (len(self.gram) if bands is None else bands))]):
             flat = X[band == b].reshape(-1, 6 * size)
+            # (6, s, 6, s) to [channel, channel, s, s]; only one of each pair is kept.
             self.gram[b] += (flat.T @ flat).reshape(6, size, 6, size).swapaxes(1, 2)[PAIRS]
             self.count[b] += len(flat)
 
@@ -102,6 +103,8 @@ class Statistics:
         bands).
         """
         weight = np.linalg.inv(noise.covariance)
+        # sum over pairs of (S^-1)_cd G_cd; pair (d, c) is the transpose: half + half', equal
+        # channels counted half before.
         half = np.tensordot(weight[:, *PAIRS] * np.where(_OWN, 0.5, 1.0), self.gram, axes=2)
         return np.asarray(half + half.T)
 
@@ -113,6 +116,7 @@ class Statistics:
         """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds
         (expectation step).
         """
+        # r = X (-phi, 1), so r_c r_d = tr(G_cd z z'); with the covariance of phi: E of it.
         z = np.append(-phi, 1.0)
         second = np.outer(z, z)
         second[:-1, :-1] += covariance
@@ -174,6 +178,7 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
 def _is_standing(position: Array) -> bool:
     """Return whether all segments at ``position`` (T, N, 3) m stay where they are."""
     away = position - position.mean(axis=0)
+    # Root of the time mean of squared displacement, the largest of all segments.
     return bool(np.sqrt(np.max(np.mean(np.sum(away**2, axis=-1), axis=0))) < _STILL)
 
 
@@ -193,7 +198,9 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
     not of the weight. A chair, a wrong zero or a posture that jumps change the plates' own load little or not at all.
     """
     weight = -float(body.gravity[2]) * float(body.sip.mass.sum())
+    # About the trial's own standing point: moments about the distant origin would be forces again.
     difference = wrench_about_point(fit.wrench.value - predict_wrench(body, fit.motion).value, about)
+    # Force or moment over its lever, whichever is larger, in newtons.
     size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(difference[:, 3:], axis=1) / _LEVER)
     around = max(1, round(_AROUND * fit.motion.rate)) if np.isfinite(fit.motion.rate) else 1
     carried = np.nan_to_num(np.linalg.norm(fit.wrench.force, axis=1))
@@ -201,6 +208,7 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""
+    # Filters smear a wrong frame into its neighbours: they are masked, too.
     left = fit.use & ~binary_dilation(wrong, iterations=around)
     worst = int(np.argmax(np.where(wrong, size / limit, -1.0)))
     return replace(fit, use=left), (

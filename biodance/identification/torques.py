@@ -78,6 +78,7 @@ def torque_bands(
     for part, frames in in_blocks(motion):
         for j, (beyond, Y) in enumerate(_beyond_joints(body, frames)):
             needed[part, j] = Y @ phi[beyond]
+            # Diagonal of Y C Y': variance of each frame's torque.
             variance[part, j] = ((Y @ covariance[np.ix_(beyond, beyond)]) * Y).sum(axis=1)
     known = np.where(motion.determined, 1.0, np.nan)[:, None]
     torque, table = np.moveaxis(needed - ground_torques(body, motion, ground)[..., None], 2, 0)
@@ -104,6 +105,7 @@ def torque_regressor_of_links(body: Body, motion: Motion) -> Array:
     where it has parts.
     """
     W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    # Links that do not hang on the joint have no part in its torque.
     return np.asarray(_about_axes(_axes(body, motion), W) * np.repeat(below(body), 10, axis=1))
 
 
@@ -121,6 +123,7 @@ def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> 
 def _about_axes(axes: tuple[Array, Array], wrench: Array) -> Array:
     """Return the moments (T, n, k) about the joint axes of wrenches (T, 6, k) about the lab origin: a . (M - o x F)."""
     axis, arm = axes
+    # a.(M - o x F) = a.M - (a x o).F.
     return np.asarray(axis @ wrench[:, 3:] - arm @ wrench[:, :3])
 
 
@@ -176,6 +179,7 @@ def impacts(found: Identification, motion: Motion, use: NDArray[np.bool_]) -> tu
     joints = [i for kind in _JOINTS for i in of[kind]]
     Y = torque_regressor(found.body, frames)[:, joints]
     moved, sd = _moved(found)
+    # Y C g / s of every quantity at once; RMS over the frames.
     added = np.sqrt(np.mean((Y.reshape(-1, Y.shape[2]) @ moved).reshape(len(Y), len(joints), -1) ** 2, axis=0))
     knee, hip = added[: len(of["knee_flexion"])].max(axis=0), added[len(of["knee_flexion"]) :].max(axis=0)
     rows = [
@@ -203,6 +207,8 @@ def _moved(found: Identification) -> tuple[Array, Array]:
     for i in range(len(found.sip.segments)):
         cut = slice(size * i, size * i + size)
         slopes[cut, cut] = segment_quantities(found.sip.phi[cut])[1].T
+    # Column k is C g_k; divided by its standard deviation the move of phi per standard deviation of quantity k.
     together = C @ slopes
+    # g_k' C g_k: sum over p of slopes[p, k] together[p, k].
     sd = np.sqrt(np.maximum(np.einsum("pk,pk->k", slopes, together), 0.0))
     return np.divide(together, sd, out=np.zeros_like(together), where=sd > 0), sd

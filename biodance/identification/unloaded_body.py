@@ -56,6 +56,7 @@ def tables_by_sides(session: Identification) -> tuple[tuple[Sip, float], ...]:
     load on one side may not pass for sides that are not alike, nor what a side has of its own for a load.
     """
     alike, apart = (_with_sides_as(session, apart=apart) for apart in (False, True))
+    # Odds of 2 for alike sides as log probabilities: 1 / (1 + e^-odds) and 1 / (1 + e^odds).
     return (alike, float(-np.log1p(np.exp(-ODDS)))), (apart, float(-np.log1p(np.exp(ODDS))))
 
 
@@ -76,6 +77,7 @@ def table_like(one: Identification, other: Identification) -> Sip:
 def scaled_to_mass(prior: Sip, mass: float) -> Sip:
     """Return the table ``prior`` scaled to a body of the same build with a total mass of ``mass`` kg."""
     ratio = mass / float(prior.mass.sum())
+    # A body scaled by r: mean times r, covariance times r².
     return Sip(prior.segments, ratio * prior.phi, ratio**2 * np.asarray(prior.covariance))
 
 
@@ -99,11 +101,14 @@ def inflate_prior(before: Sip, times: float, wrong: float = 0.0) -> Sip:
     """
     covariance = np.asarray(before.covariance)
     total = np.tile(np.eye(10)[0], len(before.segments))
+    # C 1 (1 the masses): covariance of every parameter with the total mass.
     gain = covariance @ total
     known = float(total @ gain)
     if known > 0:
+        # The part of C that goes with the total: its variance is known, only the rest is inflated.
         shared = np.outer(gain, gain) / known
         covariance = times**2 * (covariance - shared) + shared
+    # One kilogram of this body in its own proportions.
     body = before.phi / (total @ before.phi)
     return Sip(before.segments, before.phi, covariance + wrong**2 * np.outer(body, body))
 
@@ -115,8 +120,10 @@ def whiten_innovation(data: Information, before: Sip) -> tuple[Array, Array, flo
     With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
     """
     A = data.triangle @ prior_factor(before)
+    # Innovation y - R phi0 has the covariance 1 + R P R' = 1 + A A' = L L'.
     L = np.linalg.cholesky(np.eye(len(A)) + A @ A.T)
     both = np.column_stack([data.triangle, data.target - data.triangle @ before.phi])
     white = solve_triangular(L, both, lower=True)
+    # - log|L L'| / 2 - |L^-1 innovation|² / 2.
     log_evidence = -float(np.log(np.diag(L)).sum()) - 0.5 * float(white[:, -1] @ white[:, -1])
     return white[:, :-1], white[:, -1], log_evidence

@@ -68,6 +68,7 @@ class TrialValidation:
         """
         scaled = Wrench(self.table.time, self.weighed * self.table.value)
         found = [_block_squares(self, model) for model in (self.table, scaled, self.identified)]
+        # Channels in units of what the identified body leaves: newtons and newton metres count alike.
         unit = np.maximum(found[2].sum(axis=0), _TINY)
         blocks = np.maximum(np.stack([(squares / unit).sum(axis=1) for squares in found], axis=1), _TINY)
 
@@ -179,6 +180,7 @@ def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
     BiodanceError
         There are fewer than three blocks of one second: no interval can be given.
     """
+    # Squares of three forces and three moments, each summed.
     a, b = (
         np.concatenate([_block_squares(one, getattr(one, name)) for one in trials]).reshape(-1, 2, 3).sum(axis=2)
         for name in ("table", "identified")
@@ -199,4 +201,5 @@ def _block_squares(trial: TrialValidation, simulated: Wrench) -> Array:
     """Return the summed squared differences (n, 6) of measured and simulated wrench in blocks of one second."""
     size, use = max(1, round(BLOCK_SECONDS * trial.measured.rate)), np.flatnonzero(trial.use)
     difference = (trial.measured.value - simulated.value) ** 2
+    # np.array_split: no block is much shorter than the others.
     return np.array([difference[piece].sum(axis=0) for piece in np.array_split(use, max(1, use.size // size))])

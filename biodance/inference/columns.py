@@ -51,10 +51,13 @@ class VisibleColumns:
             here = np.flatnonzero(rows.group == g)
             way = np.eye(here.size)
             if g >= 0:
+                # Eigenvectors of X'X are the right singular vectors of X, its eigenvalues their
+                # squared singular values.
                 square, way = eigh(rows.X[:, here].T @ rows.X[:, here], check_finite=False)
                 way = way[:, square > _UNSEEN]
             whole = np.zeros((rows.group.size, way.shape[1]))
             whole[here] = way
+            # Back to all P coefficients: `turn` has orthonormal columns, so X turn u keeps u ~ N(0, lambda^2 1).
             parts.append(whole)
             group += [g] * way.shape[1]
         turn = np.concatenate(parts, axis=1)
@@ -64,6 +67,7 @@ class VisibleColumns:
     def only(self, where: slice) -> NDArray[np.intp]:
         """Return the indices of the columns that hold coefficients ``where`` of `Rows.X` and no others."""
         here = np.flatnonzero(self.turn[where].any(axis=0))
+        # Coefficients of other causes in the same eigenvectors: such columns cannot be assigned to one cause.
         beside = np.delete(self.turn[:, here], where, axis=0).any(axis=0)
         return np.asarray(here[~beside])
 
@@ -74,6 +78,7 @@ class VisibleColumns:
 
     def scaled(self, weight: Array) -> Array:
         """Return `plates` where each band and channel has its ``weight`` (Q,)."""
+        # X' W X = sum over q of w_q X_q' X_q: a weight that is common to a block needs no rows any more.
         return np.tensordot(weight[: len(self.inner) - 1], self.inner[:-1], 1)
 
     def within(self, Z: Array) -> Array:
@@ -85,6 +90,7 @@ def _within(rows: Rows, X: Array, Z: Array) -> Array:
     """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k) in each noise group."""
     block = rows.block[: rows.simulated]
     order = np.argsort(block, kind="stable")
+    # Sorted by noise group, the rows of each lie between two ends: one matrix product per group.
     ends = np.searchsorted(block[order], np.arange(rows.noises + 1))
     X, Z = X[order], Z[order]
     return np.array([X[a:b].T @ Z[a:b] for a, b in pairwise(ends)])

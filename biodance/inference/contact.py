@@ -51,11 +51,13 @@ class _Touch:
     @property
     def spread(self) -> Array:
         """(k, k) posterior covariance of the course, per unit of its size."""
+        # Unit-normal coefficients b of the columns size * Z: posterior covariance (1 + size^2 G)^-1.
         return np.asarray(np.linalg.inv(np.eye(len(self.score)) + self.size**2 * self.information))
 
     @property
     def course(self) -> Array:
         """(k,) posterior mean of the course."""
+        # Course = size * b and score of the scaled columns = size * s: hence size twice.
         return np.asarray(self.size**2 * self.spread @ self.score)
 
 
@@ -84,6 +86,7 @@ def _columns(rows: Rows, effect: Transient) -> Array | None:
         return None
     simulated = np.zeros((rows.simulated, own.shape[1]))
     simulated[: len(own)] = own
+    # A contact acts on the plates only: it adds nothing to markers and observations.
     return np.concatenate([rows.white(simulated), np.zeros((len(rows.y) - rows.simulated, own.shape[1]))])
 
 
@@ -96,6 +99,7 @@ def _touch_of(search: Search, base: Hypothesis, effect: Transient) -> _Touch | N
 
     def bayes(size: float) -> float:
         inner = np.eye(len(s)) + size**2 * G
+        # Integral over b ~ N(0, 1): log BF = 1/2 size^2 s'(1 + size^2 G)^-1 s - 1/2 log|1 + size^2 G|.
         return float(0.5 * size**2 * s @ solve(inner, s, assume_a="pos") - 0.5 * np.linalg.slogdet(inner)[1])
 
     value, size = max((bayes(size), size) for size in SIZES)
@@ -108,11 +112,13 @@ def _is_touch(rows: Rows, one: _Touch) -> bool:
     quick.
     """
     assert rows.problem is not None
+    # Coefficients lie instant by instant, the parameters of one instant together.
     values, beside, start = one.course.reshape(-1, len(one.effect.parameters)), [], 0
     if one_sided(values):
         return True
     for case in rows.problem.cases:
         columns = one.effect.local(case)
+        # columns (T, 6, k): k coefficients of this trial, so k / parameters instants.
         stop = start + (0 if columns is None else columns.shape[2] // values.shape[1])
         beside.append(values[start:stop] - (np.median(values[start:stop], axis=0) if stop > start else 0.0))
         start = stop
@@ -132,6 +138,7 @@ def one_sided(course: Array) -> bool:
     """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a
     slow swell does not.
     """
+    # The first right singular vector: the direction that holds most of the squares, without mean removed.
     _, _, directions = np.linalg.svd(course, full_matrices=False)
     along = course @ directions[0]
     sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
@@ -147,19 +154,24 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     columns, sd, sure, touched = search.columns, prior_sd(rows), base.sure, base
     for _ in range(_STEPS):
         found = fit(products(columns, own, base.y, sure), sd, touched.fit.scales, least=search.least)
+        # No cause of its own here: the touch and the causes of `base` are both in the columns Z.
         touched = Hypothesis((), columns, found, -np.inf, own, base.y, sure)
         added = one.size * Z @ found.last(Z.shape[1])[0]
         sure = base.sure * unlike_models(touched, (one.effect,), (added,))
     wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
+    # Under the same scales, with the widest prior of the course.
     open_ = posterior(products(columns, wide, base.y, touched.sure), sd, found.scales)
     course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)
     values = course.reshape(-1, count)
     square = np.sum(values**2, axis=1)
     order = np.argsort(square)
+    # Ascending squares: the first value at which those up to it hold half of the sum.
     k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
     spread = SIZES[-1] ** 2 * np.diag(open_.last(Z.shape[1])[1]).reshape(-1, count)[k]
     touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
+    # One size of three is taken as the best: the prior is shared by the kinds and by the sizes.
     prior = effect.prior / kinds / len(SIZES)
+    # log_posterior = log_evidence + log_sure + prior; what is left is the prior and `base.log_sure`, taken off below.
     before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
     value = found.log_evidence + touched.log_sure - base.log_sure + before + float(np.log(prior / (1 - prior)))
     causes = (*(c for c in base.causes if c.names != touch.names), touch)
@@ -186,7 +198,9 @@ def _placed(search: Search, base: Hypothesis, one: _Touch) -> tuple[Transient, A
     effect, Z, place, wide = one.effect, one.Z, np.zeros(3), SIZES[-1]
     for _ in range(_STEPS):
         course = wide * _mean(search, base, wide * Z, np.zeros(Z.shape[1]))
+        # The product Z(place) course is bilinear: beside the columns of the course, its slope by the place.
         both = np.concatenate([wide * Z, _BESIDE * _slopes(search.rows, effect, place, course)], axis=1)
+        # Linearised about the present place, with prior N(0, _BESIDE^2) about the far end: target y + slope * place.
         place = _BESIDE * _mean(search, base, both, np.append(np.zeros(Z.shape[1]), place / _BESIDE))[-3:]
         there = effect.at_full_rate().beside(place)
         columns = _columns(search.rows, there)
@@ -200,6 +214,7 @@ def _mean(search: Search, base: Hypothesis, Z: Array, there: Array) -> Array:
     about ``there`` (k,).
     """
     s, G = search.score(base, Z)
+    # Target moved by Z there: its score is s + G there, while the prior stays centred at zero.
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
@@ -207,6 +222,7 @@ def _slopes(rows: Rows, effect: Transient, place: Array, course: Array) -> Array
     """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
     and axis (the wrench is linear in it).
     """
+    # np.eye(4, 3, -1): no step, then 1 m along each axis; a difference is the exact slope of a linear function.
     here, *there = (_felt(rows, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
     simulated = rows.white(np.stack([one - here for one in there], axis=1))
     return np.concatenate([simulated, np.zeros((len(rows.y) - rows.simulated, 3))])

@@ -120,6 +120,7 @@ class Inferred:
             where, unit = best.rows.tolerated.get(one.names, (slice(0), np.zeros((1, 0))))
             if len(unit) != 1 or not unit.size or one.names in named:
                 continue
+            # Coefficients are in nominal standard deviations; unit[0] turns them into the first (only) parameter.
             (parameter,), value = one.effect.parameters, float(unit[0] @ best.coefficients[where])
             sd = np.hypot(max(best.variance(where, unit[0]) ** 0.5, parameter.alike), one.effect.size_error * value)
             size = Estimate(parameter.name, value, float(sd), unit_at(parameter.unit, one.effect.target))
@@ -144,6 +145,7 @@ def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...
         fewer = [one for one in lead.hypotheses if len(one.causes) == len(best.causes) - 1]
         best = max(fewer, key=lambda one: np.logaddexp(one.log_posterior, one.log_unknown))
     sure, rest = (every[-1] if best.causes else ()), list(every[0] if every else ())
+    # Without the causes of `sure`: each takes the place of `every[0]` in which its own cause is most probable.
     for one in sure:
         rest.remove(max(rest, key=partial(_share_in, one.cause.names)))
     held = [one.names for one in sure]
@@ -162,8 +164,10 @@ def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Map
     """Return one cause of a set, with what may stand in its place beside the others."""
     total = {one.names: float(np.logaddexp(one.log_posterior, one.log_unknown)) for one in posterior.hypotheses}
     rest, wide = best.names - {cause.names}, len(best.names)
+    # Sets that differ from the best in this one cause only: rest and one more.
     here = {next(iter(names - rest)): v for names, v in total.items() if len(names) == wide and rest < names}
     none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
+    # Set minus rest minus its prior log odds leaves the log Bayes factor of that cause beside the rest.
     shares = [(name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()]
     place = Place(cause, float(1 / (1 + np.exp(none - some))), tuple(sorted(shares, key=lambda one: -one[1])))
     alike = {(alias.effect, alias.target) for alias in place.set[1:]}
@@ -186,6 +190,7 @@ def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> Named
     weight /= weight.sum()
     size = np.array([one[1] for one in found])
     mean = weight @ size
+    # Law of total variance: mean of the covariances plus covariance of the means over the hypotheses.
     spread = np.einsum("h,hi,hj->ij", weight, size - mean, size - mean)
     return replace(cause, theta=mean, covariance=np.einsum("h,hij->ij", weight, [one[2] for one in found]) + spread)
 
@@ -266,6 +271,7 @@ def well(rows: Rows, posterior: Posterior, *, unknown_matters: bool) -> float:
     if posterior.louder is None:
         return own + float(posterior.weights[_without_large(rows, posterior), 1].sum())
     loud = posterior.louder
+    # The sets of the louder posterior already know of the unknown: they share its probability.
     return own + posterior.unknown * float(loud.weights[_without_large(rows, loud)].sum())
 
 
@@ -294,6 +300,7 @@ def _is_large(rows: Rows, one: NamedCause) -> bool:
     if one.course:
         return True
     usual = one.effect.usual
+    # Parameter 0 only: `usual` is said of the first parameter.
     if usual > 0 and abs(one.theta[0]) <= usual + one.covariance[0, 0] ** 0.5:
         return False
     if rows.problem is None:
@@ -310,6 +317,7 @@ def _is_contradicted(rows: Rows, one: NamedCause) -> bool:
     lags = [o for o in seen if (o.observer, o.unit) == (Newton.name, "s")]
     if not isinstance(one.effect, TimeDelay) or not lags:
         return False
+    # Mean with inverse variances as weights.
     share = np.array([o.sd**-2 for o in lags])
     lag = float(share @ [o.value for o in lags] / share.sum())
     return abs(lag) < abs(lag - one.theta[0])
@@ -334,8 +342,10 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     """
     one, known = place.cause, rows.tolerances
     theta, covariance = _told_size(rows, one), one.covariance
+    # `alike` is learned for the first parameter: the others in proportion to their typical sizes.
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
+    # Parameters of one unit are components of one vector: its length, not each component, scales `size_error`.
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), one.effect.size_error * length)
     if rows.problem is None:
@@ -368,7 +378,9 @@ def _visible(one: NamedCause, rows: Rows, best: Hypothesis) -> float:
         return 1.0
     slope = rows.slopes(one.effect, one.theta)[:, 0].copy()
     slope[: rows.plates] *= np.exp(-best.fit.scales.noise)
+    # Information on the size: posterior minus that of the slab, N(0, (3 typical)^2).
     known = 1 / max(one.covariance[0, 0], 1e-300) - 1 / (3 * one.effect.typical[0]) ** 2
+    # Over slope' slope, the information if all else were known: about 1 - R^2 of the slope on the other columns.
     return float(np.sqrt(np.clip(known / max(float(slope @ slope), 1e-300), 0.0, 1.0)))
 
 
@@ -388,6 +400,7 @@ def _landmarks(best: Hypothesis, rows: Rows) -> dict[str, tuple[float, float]]:
     """
     if rows.evidence is None:
         return {}
+    # Shared errors are the last of `columns.X`, in the order of `norms` (group -1: never turned).
     first = best.columns.X.shape[1] - len(rows.evidence.norms)
     found = {}
     for k, name in enumerate(rows.evidence.norms):

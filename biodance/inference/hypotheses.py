@@ -61,12 +61,14 @@ class Hypothesis:
     @property
     def left(self) -> Array:
         """(r,) whitened rows that the posterior mean leaves, in units of their noise."""
+        # Fit order: the K columns that are no fault, then those of the causes.
         K, size = self.columns.X.shape[1], self.fit.coefficients
         return np.asarray(self.surety * (self.y - self.columns.X @ size[:K] - self.Z @ size[K:]))
 
     @cached_property
     def coefficients(self) -> Array:
         """(P,) posterior mean per unit of `Rows.X`."""
+        # Directions that the rows do not show are not in `turn`: their posterior mean is zero.
         return np.asarray(self.columns.turn @ self.fit.coefficients[: self.columns.X.shape[1]])
 
     @property
@@ -93,6 +95,7 @@ class Hypothesis:
         """Return the posterior variance of ``unit`` (k,) times the coefficients of `Rows.X` ``where``, all of one
         group. In directions that the rows do not show they keep the variance of the prior.
         """
+        # value = own' u, as coefficients = turn (size * u); what turn leaves out of unit no row shows
         seen, own = unit @ self.columns.turn[where], np.zeros(self.fit.u.size)
         own[: seen.size] = seen * self.fit.size[: seen.size]
         (group,) = {*self.rows.group[where]}
@@ -106,14 +109,17 @@ class Hypothesis:
         share, found = self._in_body(one), self.rows.problem
         if share is None or found is None:
             return one.covariance
+        # Size in the body = share' (factor u): its slope by the unit-normal coefficients u of the body.
         own = found.factor.T @ share
         seen = self.columns.turn[: own.size].T @ own
         body = self.rows.groups.index(BODY)
+        # Scaled columns as in `ScaledFit.variance`; the cause's own first coefficient is added below.
         row = np.append(seen, np.zeros(self.Z.shape[1])) * self.fit.size
         at = self.columns.X.shape[1]
         for other in self.causes:
             row[at] = SCALE * one.effect.typical[0] * (other.names == one.names)
             at += other.theta.size
+        # What `own` has outside the carried directions keeps its prior variance, lambda^2 of the group body.
         unseen = float(own @ own - seen @ seen) * float(np.exp(2 * self.fit.scales.groups[body]))
         covariance = np.array(one.covariance)
         covariance[0, 0] = self.fit.variance(row) + unseen
@@ -151,6 +157,7 @@ class Posterior:
     @property
     def weights(self) -> Array:
         """(H, 2) probability of every hypothesis, without and with the unknown."""
+        # One common normalisation: both columns together sum to one.
         both = np.array([[one.log_posterior, one.log_unknown] for one in self.hypotheses])
         return np.asarray(np.exp(both - logsumexp(both)))
 
@@ -175,6 +182,7 @@ class Posterior:
         """
         held = [_seated(one.names, places) for one in self.hypotheses]
         own = float(self.weights[held].sum())
+        # Law of total probability over the noise: as usual, and as loud as the unknown makes it.
         return own if self.louder is None else (1 - self.unknown) * own + self.unknown * self.louder.share(*places)
 
     def probabilities(self) -> dict[Key, float]:

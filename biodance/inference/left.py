@@ -26,9 +26,11 @@ def adequacy(one: Hypothesis, rows: Rows) -> tuple[Adequacy, ...]:
         return ()
     where, names = rows.problem.spectrum, [case.trial.name for case in rows.problem.cases]
     square, count = energies(one)
+    # Half the logarithm of a mean of n squares has variance 1 / (2 n); its spread between bands is `OWN`.
     z = 0.5 * np.log(np.maximum(square, 1e-12)) / np.sqrt(OWN**2 + 0.5 / np.maximum(count, 1))
     left = one.left[: rows.plates].reshape(-1, 6)
     frames = max(1, sum(pick.size for picks in where.picks for pick in picks))
+    # Parseval (orthonormal cosines): squares of the coefficients over the frames are a mean square over time.
     size = np.sqrt([np.sum(_newtons(rows, left)[where.band == b] ** 2, axis=0) / frames for b in range(len(BANDS))])
     found = []
     for b in np.unique(where.band):
@@ -55,7 +57,9 @@ def _newtons(rows: Rows, left: Array) -> Array:
     """Return (m, 6) N, N·m: whitened rows of the plates as they were before."""
     assert rows.problem is not None
     mass = float(rows.problem.cases[0].body.sip.mass.sum())
+    # Whitened = W y per band, so y = W^-1 (whitened).
     coloured = np.linalg.inv(rows.tolerances.whiteners(mass))
+    # [m, i] = sum_j W^-1[band(m), i, j] left[m, j].
     return np.asarray(np.einsum("mij,mj->mi", coloured[rows.problem.spectrum.band], left))
 
 
@@ -71,6 +75,7 @@ def _second(problem: Problem, left: Array, row: Adequacy) -> float:
         full, kept = np.zeros(pick.size), int(np.sum(band >= 0))
         full[band >= 0] = own[start : start + kept]
         start += kept
+        # Only this band's coefficients: `samples` then gives the part of the residual in this band over time.
         full[band != BANDS.edges.index(row.band_hz[0])] = 0.0
         power = uniform_filter1d(bands.samples(full) ** 2, max(1, round(bands.rate)))
         largest = float(power.max())

@@ -33,12 +33,14 @@ def own_noise(rows: Rows) -> Tolerances:
     columns, scales, sd = VisibleColumns.of(rows), nominal(rows), prior_sd(rows)
     none, quiet = np.empty((len(rows.y), 0)), np.ones(rows.noises + 1)
     for _ in range(_ROUNDS):
+        # Rows over `quiet` have unit variance where the noise is as this round believes.
         found = fit(products(columns, none, rows.y, 1 / quiet), sd, scales)
         before, scales = quiet, found.scales
         quiet = _shown(rows, columns, found, before)
         if np.abs(np.log(quiet / before)).max() < _NEAR:
             break
     share = quiet[: len(BANDS) * len(CHANNELS)].reshape(len(BANDS), 1, len(CHANNELS))
+    # Columns of the Cholesky factor times the shares: L diag(share)^2 L'.
     root = np.linalg.cholesky(rows.tolerances.noise) * share
     return replace(rows.tolerances, noise=root @ root.swapaxes(1, 2))
 
@@ -47,6 +49,7 @@ def _shown(rows: Rows, columns: VisibleColumns, found: ScaledFit, quiet: Array) 
     """Return (Q + 1,) the noise of each band and channel over what is expected, from the posterior at ``quiet``."""
     n = rows.plates
     X = columns.X[:n] * found.size
+    # Leverage of each row, x' C x = |L^-1 x|^2 with A = L L': no inverse of A.
     taken = np.sum(solve_triangular(found.lower, X.T, lower=True, check_finite=False) ** 2, axis=0)
     left = rows.y[:n] - X @ found.u
     count, square, took = (np.bincount(rows.block[:n], weight, len(quiet)) for weight in (np.ones(n), left**2, taken))
@@ -54,5 +57,6 @@ def _shown(rows: Rows, columns: VisibleColumns, found: ScaledFit, quiet: Array) 
     there = (count > 0) & (free > 0)
     size = np.zeros(len(quiet))
     size[there] = 0.5 * np.log(np.maximum(square[there] / free[there], 1e-12))
+    # 2 n is the information of n squares on the logarithm of their size, 1 / LOUD^2 that of its prior.
     size *= 2 * free / (2 * free + 1 / LOUD**2)
     return np.asarray(np.clip(np.exp(size), _QUIETEST, 1.0))

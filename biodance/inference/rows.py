@@ -101,6 +101,7 @@ class Rows:
         observations.
         """
         block = self.block[: self.plates]
+        # Blocks of the plates only; minlength keeps the entries of markers and observations, at zero.
         count = np.bincount(block, minlength=self.noises + 1)
         return np.bincount(block, rows[: self.plates] ** 2, self.noises + 1) / np.maximum(count, 1)
 
@@ -142,6 +143,7 @@ class Rows:
             return np.zeros((0, len(kind.parameters)))
         columns = one.columns(kind.name, effect.target, [parameter.name for parameter in kind.parameters])
         grown = self._grown if effect.grows else np.ones(len(columns))
+        # Per standard deviation of each observation; `reach` takes out what may not tell a size.
         return np.asarray(columns * (grown * self.reach / [o.sd for o in one.observations])[:, None])
 
     @cached_property
@@ -234,9 +236,11 @@ def _simulated(
     """Return columns, target and groups of the simulated rows, and `Rows.tolerated`."""
     known, keys = nuisances(problem, tolerated), marker_keys(problem)
     columns = np.concatenate(known.parts, axis=1, dtype=float) * known.scale
+    # The mean of a tolerance is taken off the target, so that every column has mean zero and unit variance.
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), keys)
     sizes = np.array([tolerances.size(key) for key in known.keys])
     columns *= sizes
+    # Body's columns, tolerances and target are whitened in one pass over the rows.
     both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
     both = whitened(both, problem.spectrum.band, keys, _mass(problem), tolerances, out=both)
     first = problem.sip.shape[1]
@@ -257,6 +261,7 @@ def _with_observations(
     for name, (at, unit) in units.items():
         if name in seen.sensitivities:
             below[:, at] = np.outer(seen.sensitivities[name] / own, unit[0])
+    # Errors that observations share: one unit-normal coefficient each, columns below the simulated rows only.
     shared = seen.shared / own[:, None]
     top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
     bottom = np.concatenate([below, shared], axis=1) * reach[:, None]
@@ -278,6 +283,7 @@ def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:
     """Return the noise group of every row."""
     if problem is None:
         return np.full(count, -1)
+    # Rows run over coefficients first, then over the six channels, as `ravel` of (m, 6).
     plates = (6 * problem.spectrum.band[:, None] + np.arange(6)).ravel()
     markers = np.full(len(problem.target) - plates.size, 6 * len(BANDS))
     return np.concatenate([plates, markers, np.full(count - len(problem.target), -1)])

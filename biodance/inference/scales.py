@@ -103,6 +103,7 @@ class ScaledFit:
 
     def last(self, count: int) -> tuple[Array, Array]:
         """Return mean (count,) and covariance (count, count) of the last coefficients."""
+        # C = L^-T L^-1: the covariance of chosen coefficients is half' half, half = L^-1 (unit columns).
         unit = np.eye(len(self.u))[:, len(self.u) - count :]
         half = solve_triangular(self.lower, unit, lower=True, check_finite=False)
         return self.u[len(self.u) - count :], half.T @ half
@@ -125,8 +126,10 @@ class ScaledFit:
         for g in range(count):
             here = np.flatnonzero(group == g)
             within = half[np.ix_(here, here)]
+            # 2 |1 - C|^2 (Frobenius) from the lower half: off-diagonals count twice, the diagonal as (1 - C_ii)^2.
             known[g] = 4 * np.sum(within**2) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
         plates = self.products.plates[:-1, :-1]
+        # tr(L C L X'X) as a sum over products of entries; twice the lower half less the diagonal counted twice.
         both = 2 * self.size @ (half * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
         shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
         return Curvature(shares, known, float(both * np.exp(-2 * self.scales.noise)))
@@ -149,6 +152,7 @@ def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: 
     def put(inner: Array, part: slice) -> Array:
         out = np.empty((K + tail.shape[1], K + tail.shape[1]))
         cross = X[part].T @ heavy[part]
+        # X' W X is known by blocks; only the products with the tail are new for this hypothesis.
         out[:K, :K], out[:K, K:], out[K:, :K] = inner, cross, cross.T
         out[K:, K:] = tail[part].T @ heavy[part]
         return out
@@ -188,23 +192,31 @@ def fit(found: Products, sd: Array, start: Scales, *, least: float = 0.0) -> Sca
 def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     """Return the posterior under given scales, with its evidence."""
     K = found.group.size
+    # group -1 is no index of the last group here: np.where takes 1.0 for it.
     size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
+    # A column of size zero leaves A = 1 there: coefficient zero, prior variance, no part in log |A|.
     size[found.without] = 0.0
     loud = np.exp(-2 * at.noise)
     whole = found.plates * loud
     whole += found.markers
     seen = found.observed[:, found.used]
+    # Only the columns that observations have: the sum of w_i x_i x_i' has zeros elsewhere.
     whole[np.ix_(found.used, found.used)] += (seen * at.weights[:, None]).T @ seen
+    # A = 1 + L X' S^-2 X L, in place: rows, then columns times their sizes.
     A = whole[:K, :K]
     A *= size[:, None]
     A *= size
     A[np.diag_indices(K)] += 1.0
     lower = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
+    # [X y] w = y - X L u: the residual's squares come from the products alone.
     w = np.append(-size * u, 1.0)
     square, markers = float(w @ found.plates @ w), float(w @ found.markers @ w)
+    # Student's log density of the observations' residuals, without its constants.
     tails = -0.5 * (TAIL + 1) * float(np.log1p((found.observed @ w) ** 2 / TAIL).sum())
+    # - log|A| / 2 is - sum log L_kk; a noise of s costs log s for each of the plates' rows.
     value = tails - 0.5 * (square * loud + markers + u @ u) - np.log(np.diag(lower)).sum() - found.count * at.noise
+    # Normal priors of the logarithms of the scales.
     value -= 0.5 * (np.sum((at.groups / sd) ** 2) + (at.noise / LOUD) ** 2)
     return ScaledFit(lower, u, size, at, float(value), square, found)
 
@@ -217,11 +229,13 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
     at, found, free = one.scales, one.products, one.products.group >= 0
     own = np.bincount(found.group[free], minlength=sd.size)
     square = np.bincount(found.group[free], weights=one.u[free] ** 2, minlength=sd.size) + known.shares
+    # Newton step with the expected information: slope over information, both with the prior's.
     groups = (square - own - at.groups / sd**2) / (known.known + 1 / sd**2)
     free_rows = max(found.count - known.taken, 0.0)
     slope = one.square * np.exp(-2 * at.noise) + known.taken - found.count - at.noise / LOUD**2
     noise = slope / (2 * free_rows**2 / max(found.count, 1) + 1 / LOUD**2)
     groups, noise = np.clip(groups, -_FAR, _FAR), float(np.clip(noise, -_FAR, _FAR))
     w = np.append(-one.coefficients, 1.0)
+    # Weights of Student's errors, (nu + 1) / (nu + r^2): positive also for outliers, as A needs.
     weights = (TAIL + 1) / (TAIL + (found.observed @ w) ** 2)
     return Scales(np.maximum(at.groups + groups, FLOOR), max(at.noise + noise, least), weights)

@@ -135,6 +135,7 @@ def _is_heavier(posed: Problem, phi: Array) -> bool:
     with the markers grows noticeably (`Problem.with_matter`).
     """
     before = posed.prior.mass
+    # phi[::10]: the masses, first of ten parameters of each segment.
     return bool(np.any(phi[::10] - before > _HEAVIER * before))
 
 
@@ -144,6 +145,7 @@ def _predicts_otherwise(posed: Problem, phi: Array) -> bool:
     """
     both = np.zeros(2)
     for case in posed.cases:
+        # (T, 6, 2): the change of the predicted wrench beside the wrench itself, each about its mean over time.
         wrench = np.stack([case.needed(phi - case.phi), case.predicted], axis=2)
         both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
     return bool(both[0] > _STALE**2 * both[1])
@@ -206,6 +208,7 @@ def _turned(
         columns, as_is = as_they_are[key]
         own = np.array([one.sd for one in counting.observations])
         other = _log_evidence(columns, (turned / own)[here])
+        # Log odds of this one channel, the prior of a wrong sign shared by all channels.
         found.append((other - as_is + np.log(_SIGN / (1 - _SIGN) / len(counting.sign_reversed)), name))
     if not found:
         return ()

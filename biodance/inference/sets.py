@@ -69,6 +69,8 @@ class Search:
             loud = np.flatnonzero(~np.array(one.silent))
             if len(below) and loud.size:
                 own = rows.observed(one.effect)[:, loud]
+                # Columns are in units of SCALE typical sizes; what the simulation does not show
+                # has no column (`silent`).
                 below[:, cut.start : cut.start + loud.size] = own * SCALE * one.effect.typical[loud]
         Z = np.concatenate([rows.white(Z), below])
         return cls(rows, tuple(causes), log_priors(causes), VisibleColumns.of(rows), Z, cuts)
@@ -81,6 +83,7 @@ class Search:
     def crossed_at(self, weight: Array) -> Array:
         """Return (K, k) X' W Z where the rows of a noise group have one weight."""
         rows, r = self.rows, self.rows.simulated
+        # All rows of a group have the same weight: any of them fills its entry.
         groups = np.zeros(rows.noises)
         groups[rows.block[:r]] = weight[:r]
         return np.tensordot(groups, self.crossed, 1) + self.columns.X[r:].T @ (weight[r:, None] * self.Z[r:])
@@ -90,12 +93,15 @@ class Search:
         weight = self.weight(base)
         weighted = weight[:, None] * Z
         cross = np.concatenate([self.columns.X.T @ weighted, base.Z.T @ weighted])
+        # Z'W X L over the Cholesky factor of A: Z'W Z - half' half is the Schur complement of A.
         half = solve_triangular(base.fit.lower, base.fit.size[:, None] * cross, lower=True, check_finite=False)
+        # `left` holds `surety` once, `weight` holds its square: W (y - X u) needs the bare residual.
         return weighted.T @ (base.left / base.surety), Z.T @ weighted - half.T @ half
 
     def weight(self, base: "Hypothesis") -> Array:
         """Return (r,) the inverse variance of every row under a hypothesis."""
         found, n, r = base.fit, self.rows.plates, self.rows.simulated
+        # Rows of the plates have variance s^2, those of markers 1; observations have Student's weights.
         loud = np.full(n, np.exp(-2 * found.scales.noise))
         return base.surety**2 * np.concatenate([loud, np.ones(r - n), found.scales.weights])
 
@@ -133,6 +139,7 @@ def _as_loud_everywhere(search: Search, one: Hypothesis) -> float:
     loud = one.fit.scales.noise
     for _ in range(_ROUNDS):
         square, count = energies(one)
+        # The loudest block of mean square m needs the logarithm of the noise raised by log(m) / 2.
         more = 0.5 * float(np.log(square[count > 0].max()))
         if more < CONVERGED:
             break
@@ -194,6 +201,7 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
         taken = [rows.added(one.effect, one.theta) for one in causes]
         slopes = [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes]
         Z = np.concatenate(slopes, axis=1)
+        # y - taken(u) is about y - taken(u0) - Z (u - u0): a linear problem in u with this target.
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
         found = posterior(products(columns, Z, y, sure, without), prior_sd(rows), at)
         u, C = found.last(u0.size)
@@ -202,8 +210,10 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
         sure, at = unlike_models(one, effects, taken), nearer(found, prior_sd(rows), search.least)
         if max(moved, at.far(found.scales), float(np.abs(sure - one.sure).max())) < CONVERGED:
             break
+    # log_evidence is of scaled rows; `log_sure` is the Jacobian of that scaling.
     value = found.log_evidence + one.log_sure + sum(search.prior[c.names] for c in causes)
     possible = all(rows.possible(c.effect, c.theta) for c in causes)
+    # A cause that cannot be in this session keeps a log posterior of minus infinity.
     return replace(one, log_posterior=value) if possible else one
 
 
@@ -237,15 +247,18 @@ def unlike_models(one: Hypothesis, effects: Sequence[Effect], taken: Sequence[Ar
     loud = np.exp(-2 * one.fit.scales.noise)
     most = np.zeros(rows.noises + 1)
     for effect, added in zip(effects, taken, strict=True):
+        # In units of the session's noise, like `left` below.
         most += effect.unlike**2 * loud * rows.mean_square(added)
     most[: len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
     left = loud * rows.mean_square(one.left / one.surety)
+    # Variance 1 + what is left beyond the noise, at most the share `unlike` of what the causes add; its root scales.
     return np.asarray(1 / np.sqrt(1 + np.clip(left - 1.0, 0.0, most)))
 
 
 def at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
     """Return a hypothesis under other scales."""
     found = posterior(base.fit.products, prior_sd(search.rows), scales)
+    # The same sizes and prior: only the evidence of the coefficients changes.
     value = base.log_posterior - base.fit.log_evidence + found.log_evidence
     return replace(base, fit=found, log_posterior=value)
 
@@ -258,6 +271,7 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
     scales, tolerated = one.fit.scales, np.array([name == TOLERATED for name in search.rows.groups], dtype=bool)
     if np.any(scales.groups[tolerated] > _GROWN):
         usual = at_scales(search, one, replace(scales, groups=np.where(tolerated, 0.0, scales.groups)))
+        # Both gains count from `one`: the loss of evidence by the usual scales is charged.
         lost = usual.fit.log_evidence - one.fit.log_evidence
         for again in _scored(search, usual):
             key = again.effect.name, again.effect.target
@@ -273,6 +287,7 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
     cross = search.crossed_at(weight)
     if one.Z.shape[1]:
         cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
+    # L^-1 (L_size X' W Z) of all causes at once; the Schur complement of each is cut out of it below.
     half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
     heard, sizes = _told_by_outliers(left[r:], search.Z[r:, [cut.start for cut in search.cuts]])
     scored = []
@@ -284,6 +299,7 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
         G, s = Z.T @ weighted - half[:, cut].T @ half[:, cut], weighted.T @ left
         inner = np.linalg.inv(np.eye(len(s)) + G)
         mean = inner @ s
+        # `inner` is (1 + G)^-1: + 1/2 log|inner| is - 1/2 log|1 + G|.
         value = 0.5 * float(s @ mean) + 0.5 * float(np.linalg.slogdet(inner)[1])
         if told > value:
             value, mean = float(told), np.append(size, np.zeros(len(s) - 1))
@@ -300,8 +316,11 @@ def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[flo
     """
     out = []
     for share in effect.screened_at:
+        # One column, the whole of what the cause adds at that size: coefficient 1.
         s, G = search.score(one, search.rows.added(effect, share * effect.typical)[:, None])
         u = share / SCALE
+        # log p(y | u) / p(y | 0) = s - G / 2; -u^2 / 2 of the slab; G / u^2: information per
+        # slab's standard deviation.
         value = s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)
         out.append((float(value), share * effect.typical))
     return out
@@ -313,8 +332,10 @@ def _told_by_outliers(left: Array, z: Array) -> tuple[Array, Array]:
     """
     size, weight = np.zeros(z.shape[1]), np.ones(z.shape)
     for _ in range(_ROUNDS):
+        # One size per column (ridge with unit-normal prior), then Student's weights at its residuals.
         size = left @ (weight * z) / (1 + (weight * z**2).sum(axis=0))
         weight = (TAIL + 1) / (TAIL + (left[:, None] - z * size) ** 2)
     gained = np.log1p(left**2 / TAIL)[:, None] - np.log1p((left[:, None] - z * size) ** 2 / TAIL)
     told = 0.5 * (TAIL + 1) * gained.sum(axis=0) - 0.5 * size**2
+    # Laplace: half the logarithm of 1 + information.
     return told - 0.5 * np.log1p((weight * z**2).sum(axis=0)), size

@@ -27,6 +27,7 @@ def energies(one: Hypothesis) -> tuple[Array, Array]:
     n = one.rows.plates
     left = one.left[:n]
     count = np.bincount(one.rows.block[:n]).astype(float)
+    # exp(2 noise): factor on the variance of the noise.
     loud = np.exp(2 * one.fit.scales.noise)
     return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
 
@@ -39,13 +40,16 @@ def with_unknown(one: Hypothesis) -> Hypothesis:
     square, count = energies(one)
     if not count.any():
         return one
+    # Logarithm of the noise of each block: half that of its mean square.
     blocks = 0.5 * np.log(np.maximum(square[count > 0], 1e-12))
     kinds = (
+        # The spread that blocks have anyway, and that of an estimate from n squares, 1 / (2 n).
         (blocks, np.sqrt(OWN**2 + 0.5 / count[count > 0])),
         (np.array([one.fit.scales.noise]), np.array([LOUD])),
         (one.fit.scales.groups, prior_sd(one.rows)),
     )
     each = [
+        # Which scale of a kind is larger is not known: the mean of their Bayes factors.
         float(logsumexp(_excess(away, usual))) - np.log(len(away)) + np.log(p / (1 - p))
         for (away, usual), p in zip(kinds, P_UNKNOWN, strict=True)
     ]
@@ -59,4 +63,5 @@ def _excess(away: Array, usual: Array) -> Array:
     N(0, `EXCESS`^2) against N(0, ``usual``^2).
     """
     wide = np.hypot(EXCESS, usual)
+    # Only larger than usual speaks for an unknown: below zero the quadratic term is left out.
     return np.asarray(0.5 * np.maximum(away, 0.0) ** 2 * (usual**-2 - wide**-2) - np.log(wide / usual))

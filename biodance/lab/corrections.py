@@ -63,6 +63,7 @@ def _free(plate: Plate, one: PlateCorrection) -> Plate:
     """Return a plate as it would have recorded without the cause, at the same times."""
     free = one.fault.undone(plate, one.target.rpartition(":")[2], one.value)
     time, moved = plate.wrench.time, free.wrench.time
+    # Only a delay moves the times; all else is done.
     if moved is time:
         return free
     from scipy.interpolate import make_interp_spline
@@ -71,8 +72,10 @@ def _free(plate: Plate, one: PlateCorrection) -> Plate:
     known = np.isfinite(value).all(axis=1)
     if not known.any():
         return plate
+    # The free samples, at their own times, read at the times of the record.
     spline = make_interp_spline(moved[known], value[known], k=min(3, int(known.sum()) - 1))
     there = np.clip(time, *moved[known][[0, -1]])
+    # Between a known and an unknown sample the interpolated mark is above zero.
     beside = np.interp(there, moved, np.logical_not(known)) > 0
     return replace(plate, wrench=Wrench(time, np.where(beside[:, None], np.nan, spline(there))))
 
@@ -95,6 +98,7 @@ def correction_doubts(trial: Trial, corrections: Iterable[PlateCorrection]) -> A
     found, plain = [], trial.wrench.value
     for one in corrections:
         more = corrected_trial(trial, [replace(one, value=one.sd)]) if np.isfinite(one.sd) else trial
+        # By how much the corrected wrench changes when one standard deviation more is taken off.
         found.append(np.nan_to_num(plain - more.wrench.value))
     return np.stack(found, axis=2) if found else np.zeros((*plain.shape, 0))
 

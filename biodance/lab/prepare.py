@@ -44,8 +44,10 @@ class LowPass:
 
     def gain(self, frequency: Array, rate: float) -> Array:
         """Return the gain (n,) of both passes together at each ``frequency`` (n,) Hz below half the ``rate`` Hz."""
+        # tan: the bilinear transform maps analog frequencies so.
         relative = np.tan(np.pi * np.asarray(frequency) / rate) / self._raised(rate)
         if self.kind == "critically_damped":
+            # Each of n first-order sections has 1 / sqrt(1 + r²), run twice.
             return np.asarray((1 + relative**2) ** -float(self.order))
         return np.asarray(1 / (1 + relative ** (2 * self.order)))
 
@@ -53,6 +55,7 @@ class LowPass:
         """Return tan(pi f / rate) of the frequency f that one pass is designed for."""
         wanted = float(np.tan(np.pi * self.cutoff / rate))
         if self.kind == "critically_damped":
+            # (1 + r²)^-n = 1 / sqrt(2).
             return wanted / float(np.sqrt(2 ** (0.5 / self.order) - 1))
         # both passes: 1 / (1 + r^(2 n)) = 1 / sqrt(2) at the wanted frequency, r relative to the designed one
         return wanted * float((np.sqrt(2) - 1) ** (-0.5 / self.order))
@@ -84,8 +87,10 @@ def _design_low_pass(settings: LowPass, rate: float) -> Array:
             f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
             f"below {rate / 2:g} Hz."
         )
+    # Back through the bilinear transform to Hz.
     designed = np.arctan(settings._raised(rate)) * rate / np.pi
     if settings.kind == "critically_damped":
+        # The same first-order section, once for each order: no overshoot.
         return np.tile(butter(1, designed, fs=rate, output="sos"), (settings.order, 1))
     return butter(settings.order, designed, fs=rate, output="sos")
 
@@ -113,6 +118,7 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     columns = values.reshape(values.shape[0], -1)
     whole = ~np.isnan(columns).any(axis=0)
     if whole.all():
+        # Padding of one period, reflected about the end points.
         return np.asarray(sosfiltfilt(sections, columns, axis=0, padlen=need - 1)).reshape(values.shape)
     out = columns.copy()
     if whole.any():
@@ -252,6 +258,7 @@ def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:
     """Return the wrench (T, 6) at marker times, by a cubic spline where no samples lie there; how it was found."""
     after = np.clip(np.searchsorted(wrench.time, time), 0, wrench.time.size - 1)
     before = np.maximum(after - 1, 0)
+    # The nearer of the two samples around each frame.
     nearest = np.where(time - wrench.time[before] < wrench.time[after] - time, before, after)
     if wrench.time.size == 1 or np.allclose(wrench.time[nearest], time, rtol=0, atol=1e-6):
         return wrench.value[nearest], "sampled at the marker frames"
@@ -261,6 +268,7 @@ def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:
     if known.sum() < 2:
         return np.full((time.size, 6), np.nan), "nothing known at the marker frames"
     spline = make_interp_spline(wrench.time[known], wrench.value[known], k=min(3, int(known.sum()) - 1))
+    # Outside the record nothing is extrapolated: the end values.
     value = spline(np.clip(time, wrench.time[0], wrench.time[-1]))
     value[~(known[before] & known[after])] = np.nan
     return value, "interpolated at the marker frames"

@@ -116,6 +116,7 @@ def for_joints(
         read = name in found.joints
         angle[:, column] = found.angle[:, found.joints.index(name)] if read else fixed[name]
     low, high = limits
+    # Positive: how far beyond the nearer limit.
     beyond = np.maximum(low - angle.min(axis=0), angle.max(axis=0) - high)
     worst = int(np.argmax(beyond))
     if np.abs(angle).max() > _TURN:
@@ -306,7 +307,9 @@ def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: d
     first = recorded.plates[0].wrench
     if any(one.wrench.time.size != first.time.size for one in recorded.plates):
         raise FileRefused(f"{plate}: its plates have different lengths. Export them at one rate.")
+    # Mean height of the surfaces over the lab's origin.
     surface = np.array([0.0, 0.0, np.mean([one.height for one in recorded.plates])])
+    # All about one point on the surface, so that they add.
     total = np.sum([wrench_about_point(one.wrench.value, surface) for one in recorded.plates], axis=0)
     said = (*(text for one in recorded.plates for text in one.decisions), *recorded.history)
     found = Encoders(encoders.time, joints, encoders.angle, encoders.notes)

@@ -81,6 +81,7 @@ def _falls(trial: Trial, start: int, stop: int) -> bool:
 
 def _is_free_fall(time: Array, height: Array, gravity: float) -> bool:
     middle = time - time.mean()
+    # z = c t² + ..: acceleration 2 c, downwards positive below.
     curve = np.polyfit(middle, height, 2)
     straight = np.sqrt(np.mean((np.polyval(curve, middle) - height) ** 2)) < _PARABOLA
     return bool(straight and -2 * curve[0] >= _FALLS * gravity)
@@ -100,6 +101,7 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
     if not lacks.any() or trial.markers is None:
         return found
     step = float(np.median(np.diff(trial.markers.time)))
+    # Half the parabola's width, so that mean and curvature see about the same instants.
     smooth = uniform_filter1d(lacks, max(1, round(_SMOOTH / step / 2)))
     long = [(start, stop) for start, stop in runs(smooth > _LACKS) if stop - start >= _LASTING / step]
     for first, last in runs(lacks > _ENDS):
@@ -124,6 +126,7 @@ def share_lacking(trial: Trial, *, weight: float) -> Array:
     if not whole.any() or total.size < frames:
         return np.zeros(total.size)
     height = markers.xyz[:, trunk if trunk.any() else whole, 2].mean(axis=1)
+    # By Newton F / (m g) = 1 + a / g; the second derivative of a parabola through `frames` samples.
     needed = 1 + savgol_filter(height, frames, 2, deriv=2, delta=step) / trial.settings.gravity
     return np.nan_to_num(needed - total / weight)
 
@@ -233,8 +236,10 @@ def belts(trial: Trial, soles: Soles, load: Mask) -> tuple[Array, tuple[str, ...
     if soles.time.size < _FEWEST:
         return found, ()
     velocity, on = np.gradient(soles.outline, soles.time, axis=0), standing_on(trial.plates, soles)
+    # Largest deviation of a sole's points from their mean velocity: small where it neither rolls nor turns.
     spread = np.linalg.norm(velocity - velocity.mean(axis=2, keepdims=True), axis=-1).max(axis=2)
     height = soles.outline[..., 2].mean(axis=2)
+    # Height over the lowest in which this foot was ever seen: the floor need not be known.
     flat = (spread < _RIGID) & (height < np.nanmin(height, axis=0, initial=np.inf) + _LOW)
     for index, plate in enumerate(trial.plates):
         here = flat & on[:, :, index] & load[:, index, None]
@@ -373,6 +378,7 @@ def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
         )
     force = np.stack([plate.wrench.force[:, 2] for plate in trial.plates], axis=1)
     largest = float(np.nanmax(force.sum(axis=1), initial=0.0))
+    # Shares of the largest total force: the same rule for light and heavy persons.
     load, pressed = (force > max(rules.force, share * largest) for share in (rules.loaded, rules.pressed))
     moving, belted = belts(trial, soles, load)
     speed = speeds(soles, trial.plates, moving)
@@ -416,8 +422,10 @@ def _seated_note(seated: Mask) -> tuple[str, ...]:
 
 def _told(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> Mask:
     """Return (T, 2) where a foot is off the ground, or stands wholly over plates that the other foot is not on."""
+    # Both feet over one plate: its wrench cannot be divided between them by measurement.
     shared = np.any(np.all(place.on_plate, axis=1), axis=1)
     silent = np.any(place.on_plate & rests[..., None] & ~load[:, None], axis=2)
+    # A loaded plate under no foot: somebody or something else loads it, and no foot's wrench is certain.
     orphan = np.any(load & ~np.any(place.on_plate, axis=1), axis=1)
     known = np.all(np.isfinite(trial.wrench.value), axis=1) & ~shared & ~orphan
     return np.asarray(known[:, None] & ~place.unseen & (~touching | place.covered) & ~silent)
@@ -427,6 +435,7 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
     """Return (T, 2) where a foot may touch: low and slow, or not seen, widened in time."""
     height = soles.outline[..., 2] - surfaces.offset
     near = np.abs(height[..., None] - np.array(surfaces.levels)).min(axis=-1) < rules.height
+    # Below all known levels counts as low: a step down that no level knows yet.
     low = near | (height < min(surfaces.levels))
     unseen = np.isnan(height).any(axis=2)
     found = (low & (speed < rules.speed)).any(axis=2)

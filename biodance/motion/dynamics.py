@@ -61,6 +61,7 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
     pin = load_pinocchio()
     model = body.model
     data = model.createData()
+    # Pinocchio's joint 0 is the universe, 1 the free root: the body's joint k is k + 2, or k + 1 without root.
     first = 2 if body.n_root else 1
     owner = {name: body.segment_joint[body.segment_index(name)] + first for name in contacts}
     root, total = body.n_root, np.empty((motion.time.size, body.nv))
@@ -69,9 +70,11 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
         pin.forwardKinematics(model, data, motion.q[frame])
         applied = pin.StdVec_Force([pin.Force.Zero() for _ in range(model.njoints)])
         for name, wrench in contacts.items():
+            # Wrench about the lab origin to the joint's own frame: Pinocchio's external forces are local.
             applied[owner[name]] += data.oMi[owner[name]].actInv(pin.Force(wrench.value[frame]))
         total[frame] = pin.rnea(model, data, motion.q[frame], motion.v[frame], motion.a[frame], applied)
         if root:
+            # The root's six generalised forces are a wrench in its frame; back to the lab origin.
             residual[frame] = data.oMi[1].act(pin.Force(total[frame, :6])).vector
     return _JointTorques(motion.time, total[:, root:], residual)
 
@@ -108,11 +111,14 @@ def distribute(
     share = _right_share(total, right, left, np.asarray(touching, dtype=bool), threshold)
     centre = share[:, None] * right + (1 - share[:, None]) * left
     point = zero_moment_point(total.value, height=centre[:, 2], threshold=threshold)
+    # About the zero-moment point only the vertical moment is left: the twist.
     twist = wrench_about_point(total.value, point)[:, 3:] * np.array([0.0, 0.0, 1.0])
     loaded = np.isfinite(point)
     feet = []
     for part, place in ((share, right), (1 - share, left)):
+        # Both places moved by the same vector: sum of share * place is the total's point, so moments add up.
         own = wrench_about_origin(np.concatenate([total.force, twist], axis=1), place + point - centre)
+        # Without load there is no point: the moments are shared as they are.
         moment = np.where(loaded, own[:, 3:], total.moment)
         feet.append(Wrench(total.time, part[:, None] * np.concatenate([total.force, moment], axis=1)))
     return feet[0], feet[1]
@@ -122,6 +128,7 @@ def _right_share(total: Wrench, right: Array, left: Array, touching: NDArray[np.
     """Return the right foot's share (T,) of the total, between 0 and 1."""
     point = zero_moment_point(total.value, height=(right[:, 2] + left[:, 2]) / 2, threshold=threshold)
     d_right, d_left = (np.linalg.norm((point - centre)[:, :2], axis=1) for centre in (right, left))
+    # Near its own centre a foot has nearly all: its share is the other foot's distance.
     shared = np.divide(d_left, d_right + d_left, out=np.full(total.time.size, 0.5), where=d_right + d_left > 0)
     return np.where(touching[:, 0] == touching[:, 1], shared, touching[:, 0].astype(float))
 
@@ -145,6 +152,7 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | No
     """
     frames, count = segments.position.shape[:2]
     W = np.zeros((frames, 6, 10 * count))
+    # W is linear in a - g, so that gravity enters as an acceleration of the whole body.
     omega, alpha, drive = segments.angular_velocity, segments.angular_acceleration, segments.acceleration - gravity
     fill_regressor(segments.rotation, segments.position, omega, alpha, drive, W)
     return W if sharing is None else W @ sharing
@@ -277,5 +285,6 @@ def _pearson(first: Array, second: Array) -> float | None:
     if first.size < _LEAST_FRAMES:
         return None
     a, b = first - first.mean(), second - second.mean()
+    # Constant up to rounding: a correlation would be that of the rounding.
     flat = [np.linalg.norm(centred) <= 1e-9 * np.linalg.norm(signal) for centred, signal in ((a, first), (b, second))]
     return None if any(flat) else float(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1.0, 1.0))

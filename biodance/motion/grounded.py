@@ -47,10 +47,13 @@ class BaseSeen:
         """
         if self.position is not None:
             return self.rotation, self.position
+        # R B' z: the direction that the IMU takes for up, as the chain from the foot has it.
         up = np.einsum("tij,tkj,k->ti", rotation, self.rotation, np.array([0.0, 0.0, 1.0]))
         axis = cross(up, np.array([0.0, 0.0, 1.0]))  # of the smallest turn that brings `up` upright
         K = skew(axis)
+        # Rodrigues with cos = up_z: 1 + K + K² / (1 + cos), K = [up x z]x.
         turn = np.asarray(np.eye(3) + K + K @ K / (1 + up[:, 2])[:, None, None])
+        # The turn is about the foot's middle, which stands.
         return turn @ rotation, foot + np.einsum("tij,tj->ti", turn, position - foot)
 
 
@@ -76,6 +79,7 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
     rotation, position = np.full((len(seen), 3, 3), np.nan), np.full((len(seen), 3), np.nan)
     turn, position[whole] = rigid_fit(local, seen[whole])
     rotation[whole] = turn
+    # Measured less model: p + R local.
     off = seen[whole] - position[whole][:, None] - np.einsum("tij,kj->tki", turn, local)
     rms = float(np.sqrt(np.mean(np.sum(off**2, axis=2))))
     if rms > _FAR:
@@ -131,6 +135,7 @@ class Grounded:
     @property
     def supports(self) -> tuple[tuple[str, float, float], ...]:
         """Side that the frame hangs on, from and to, s."""
+        # Indices at which the stance changes, with both ends.
         edges = [0, *(np.flatnonzero(np.diff(self.foot)) + 1).tolist(), self.foot.size]
         time = self.motion.time
         return tuple((SIDES[self.foot[a]], float(time[a]), float(time[b - 1])) for a, b in pairwise(edges))
@@ -178,6 +183,7 @@ def ground(
     stands = height > -depth
     unclear = np.asarray(stands.all(axis=0) & (height > depth).any(axis=0))
     if lean is not None:
+        # Where both could stand, the one that is told; -1 tells nothing.
         stands &= ~unclear | (lean < 0) | (lean == [[0], [1]])
     foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
     q = _q(angle, turn, place, foot, base=base)
@@ -189,6 +195,7 @@ def _q(
 ) -> Array:
     """Return configurations (T, nq) of a robot on ``foot`` (T,); ``tilt`` (T, 3) rad turns its sole from flat."""
     rotation, position = _chained(turn, place, foot)
+    # Middle of the standing sole in the frame of the first one: it stays where it is under any turn.
     middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
     if tilt is not None:
         from scipy.spatial.transform import Rotation
@@ -233,6 +240,7 @@ def _leg(body: Body) -> float:
 def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
     """Return both soles in the root's frame, turn and place, and ``height`` (2, T) m of the other's lowest corner."""
     root = np.array([0.0, 0, 0, 0, 0, 0, 1])
+    # First row: zero angles, in which the sole says what is forwards.
     q = np.concatenate([np.tile(root, (len(angle) + 1, 1)), np.vstack([np.zeros(angle.shape[1]), angle])], axis=1)
     pose = poses(body, q)
     turn, place, corners = [], [], []
@@ -240,12 +248,15 @@ def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
         foot = body.feet[side]
         rotation, position = pose.rotation[:, foot.segment], pose.position[:, foot.segment]
         up = sole_normal(foot)
+        # Forwards of the root at zero angles, in the foot's axes; then square to the sole.
         ahead = rotation[0].T @ np.array([1.0, 0.0, 0.0])
         ahead = ahead - (ahead @ up) * up
         ahead /= np.linalg.norm(ahead)
+        # Columns forwards, left, up: the sole's frame in the root's.
         turn.append(rotation[1:] @ np.stack([ahead, np.cross(up, ahead), up], axis=1))
         place.append(position[1:] + rotation[1:] @ foot.outline.mean(axis=0))
         corners.append(position[1:, None] + foot.outline @ np.swapaxes(rotation[1:], 1, 2))
+    # Corners of the other foot above this sole's plane: its third axis times the way from its middle.
     height = [np.einsum("tkj,tj->tk", corners[1 - s] - place[s][:, None], turn[s][:, :, 2]).min(axis=1) for s in (0, 1)]
     return np.array(turn), np.array(place), np.array(height)
 
@@ -257,6 +268,7 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
             "At no time does a foot stand flat: each sole lies under the other's plane. Are columns swapped, or signs "
             "turned?"
         )
+    # Where both could stand at first, the foot that could more often.
     foot, now = np.zeros(stands.shape[1], dtype=np.intp), int(np.argmax(stands.sum(axis=1)))
     starts = np.flatnonzero(stands.any(axis=0))
     now = int(np.argmax(stands[:, starts[0]])) if not stands[:, starts[0]].all() else now
@@ -269,6 +281,7 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
     wide = round(_AROUND * rate)
     for change in np.flatnonzero(np.diff(foot)):
         use[max(0, change - wide) : change + wide + 1] = False
+    # At both ends nothing tells whether the foot has just changed.
     use[:wide] = use[-wide:] = False
     for start, stop in runs(use):
         if stop - start < _SHORT * rate:
@@ -295,10 +308,13 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
         side = foot[start]
         if start:  # the root as the foot before sees it, then the new sole from the root, laid flat
             before = 1 - side
+            # Root in the frame so far: the sole before stands at `at`, `yaw`; R_root = yaw R_sole'.
             root = yaw @ turn[before, start].T
             origin = at - root @ place[before, start]
             at, yaw = origin + root @ place[side, start], root @ turn[side, start]
+            # Laid flat: height zero and only the yaw of the new sole is kept.
             at, yaw = at * np.array([1.0, 1.0, 0.0]), elementary_rotation("z", float(np.arctan2(yaw[1, 0], yaw[0, 0])))
+        # Inverse of the sole in the root's frame: R' and -R' p.
         rotation[start:stop] = yaw @ np.swapaxes(turn[side, start:stop], 1, 2)
         position[start:stop] = at - np.einsum("tij,tj->ti", rotation[start:stop], place[side, start:stop])
     return rotation, position
@@ -354,6 +370,7 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, withi
             "that shifts the weight."
         )
     correlation, slope, first, second = _correlated(path, mask, other, np.isfinite(other))
+    # Lag k of the list is k - (n - 1) samples, behind the difference of the clocks' starts.
     late = clock[0] - needed.time[0] + (np.arange(correlation.size) - (path.size - 1)) / rate
     size = np.where(np.abs(late) <= within, np.abs(correlation), 0.0)
     k = int(np.argmax(size))
@@ -363,7 +380,9 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, withi
         )
     part = _peak(size, k)
     lag = k - (path.size - 1) + part
+    # A complex slope of unit size is the turn; what is beyond one is the scale.
     turn = slope[k] / abs(slope[k])
+    # Means over the overlap: turned path plus shift.
     place = second[k] - turn * first[k]
     delay = clock[0] - needed.time[0] + lag / rate
     return PlateFit(
@@ -386,6 +405,7 @@ def from_plate(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
     """Return a wrench (T, 6) about the lab origin in a frame at ``place`` m, turned by ``yaw`` rad about z."""
     near = wrench_about_point(wrench, np.array([*place, 0.0]))
     turn = elementary_rotation("z", yaw)
+    # Rows times R are R' applied to each vector: lab to the turned frame.
     return np.concatenate([near[:, :3] @ turn, near[:, 3:] @ turn], axis=1)
 
 
@@ -395,6 +415,7 @@ def _path(wrench: Array) -> NDArray[np.complex128]:
     least = 0.2 * np.nanmedian(np.abs(force))
     path = np.full(force.size, complex(np.nan, np.nan))
     some = np.abs(force) > max(least, 1e-9)
+    # Centre of pressure x = -My / Fz, y = Mx / Fz, as one complex number.
     path[some] = (-wrench[some, 4] + 1j * wrench[some, 3]) / force[some]
     return path
 
@@ -403,17 +424,21 @@ def _correlated(
     a: NDArray[np.complex128], a_mask: NDArray[np.bool_], b: NDArray[np.complex128], b_mask: NDArray[np.bool_]
 ) -> tuple[NDArray[np.complex128], ...]:
     """Return for every lag of b behind a: correlation, slope of b on a, and their means over the overlap."""
+    # About their own means: less is lost by rounding in the sums of products.
     shift_a, shift_b = a[a_mask].mean(), b[b_mask].mean()
     x, y = (np.where(m, z - c, 0) for z, m, c in ((a, a_mask, shift_a), (b, b_mask, shift_b)))
     size = 1 << int(np.ceil(np.log2(a.size + b.size)))
+    # No lag wraps round at a length of at least both together; negative lags lie at the end.
     lags = (np.arange(-(a.size - 1), b.size)) % size
 
     def sums(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.complex128]:
         product = np.conj(np.fft.fft(one, size)) * np.fft.fft(other, size)
+        # sum over n of conj(one[n]) other[n + lag], for all lags at once.
         return np.asarray(np.fft.ifft(product)[lags])
 
     count = sums(a_mask * 1.0, b_mask * 1.0).real.round()
     n = np.maximum(count, 1)
+    # Number, means and products over the frames that both have at this lag.
     mean_a, mean_b = np.conj(sums(x, b_mask * 1.0)) / n, sums(a_mask * 1.0, y) / n
     both = sums(x, y) / n - np.conj(mean_a) * mean_b
     own_a = sums(np.abs(x) ** 2, b_mask * 1.0).real / n - np.abs(mean_a) ** 2

@@ -32,6 +32,7 @@ class Poses:
     def points(self, segment: tuple[int, ...] | list[int], local: Array) -> Array:
         """Return the lab positions (T, K, 3) m of points ``local`` (K, 3) fixed in the given segments (K)."""
         index = list(segment)
+        # sum over j of R[t, k, i, j] local[k, j], plus the origin.
         return np.einsum("tkij,kj->tki", self.rotation[:, index], local) + self.position[:, index]
 
     def at(self, some: slice) -> "Poses":
@@ -86,6 +87,7 @@ def segment_motion(body: Body, motion: Motion, *, pose: Poses | None = None) -> 
         turn = pose.root_rotation
         w_root = np.einsum("tij,tj->ti", turn, angular)
         dw_root = np.einsum("tij,tj->ti", turn, motion.a[:, 3:6])
+        # Pinocchio's a is the derivative of v in the root's own, turning frame: + w x v.
         acc_root = np.einsum("tij,tj->ti", turn, motion.a[:, :3] + cross(angular, linear))
     rate, rate2 = np.array(motion.v[:, body.n_root :]), np.array(motion.a[:, body.n_root :])
     root = np.stack([w_root, dw_root, acc_root, pose.root_position])
@@ -101,6 +103,7 @@ def _of_segments(body: Body, root: Array, joints: Array) -> Array:
     carrier = np.array(body.segment_joint)
     if not body.joints:
         return np.repeat(root[:, None], carrier.size, axis=1)
+    # Segments of the root have joint -1: index 0 is a stand-in that is overwritten.
     found = joints.take(np.maximum(carrier, 0), axis=1)
     found[:, carrier < 0] = root[:, None]
     return found
@@ -125,6 +128,7 @@ def joint_arrays(body: Body) -> tuple[Index, Array, Array, Array]:
     """
     axis = np.array([joint.axis for joint in body.joints], dtype=float).reshape(-1, 3)
     fixed = np.array([joint.rotation for joint in body.joints], dtype=float).reshape(-1, 3, 3)
+    # Rodrigues: R = F (1 + sin K + (1 - cos) K²), K = [axis]x, F the fixed placement.
     sine = fixed @ skew(axis)
     turn = np.stack([fixed, sine, sine @ skew(axis)], axis=1)
     translation = np.array([joint.translation for joint in body.joints], dtype=float).reshape(-1, 3)
@@ -150,6 +154,7 @@ def chains(body: Body) -> tuple[tuple[int, ...], ...]:
         while last >= 0:
             chain.append(last)
             last = body.joints[last].parent
+            # A chain ends where a joint before carries a segment: its other axes are massless.
             if last < 0 or body.joints[last].segment >= 0:
                 break
         if chain:

@@ -73,6 +73,7 @@ class Trunk:
         for span in self.spans(_WEIGHS):
             weight, bend = fading(self.time[span])
             height = self.height[span]
+            # Mean of the acceleration from places alone: integrated twice by parts onto the weights.
             acceleration = float(bend @ (height - height.mean()))
             sd = float(np.hypot(_WEIGHED, _UNLIKE * acceleration / gravity))
             found.append((span, weight / (gravity + acceleration), sd))
@@ -198,20 +199,25 @@ def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, fl
     wanted = trunk.acceleration[here] - trunk.acceleration[here].mean()
     found = np.stack([np.interp(trunk.time[here] + lag, time, slow) for lag in lags])
     found -= found.mean(axis=1, keepdims=True)
+    # Pearson's correlation at every lag, both about their means.
     size = np.linalg.norm(found, axis=1) * np.linalg.norm(wanted)
     alike = found @ wanted / np.where(size > 0, size, np.inf)
     peaks = np.flatnonzero((alike[1:-1] >= alike[:-2]) & (alike[1:-1] >= alike[2:])) + 1
     unmoved = float(alike[lags.size // 2])
     if not peaks.size or alike[peaks].max() < TELLS:
         return float("nan"), float("nan"), float(alike.max()), unmoved
+    # Share of the force that the acceleration does not explain.
     rest = 1 - alike[peaks] ** 2
     near = peaks[rest <= _AMBIGUOUS * rest.min()]
     k = near[np.argmin(np.abs(lags[near]))]
     bend = alike[k - 1] - 2 * alike[k] + alike[k + 1]
+    # Top of the parabola through three correlations.
     lag = lags[k] + (0.5 * _STEP * (alike[k - 1] - alike[k + 1]) / bend if bend < 0 else 0.0)
     slope = found[k] @ wanted / (wanted @ wanted)
     left, moves = found[k] - slope * wanted, np.gradient(slow, time)
+    # A lag changes the force by its rate: what is left over the rate, over the root of independent samples.
     steep = float(np.interp(trunk.time[here] + lag, time, moves).std())
+    # A signal below f Hz has 2 f independent samples a second.
     independent = 2 * _BAND.cutoff * here.size / trunk.rate
     return float(lag), float(left.std() / steep / independent**0.5), float(alike[k]), unmoved
 
@@ -222,6 +228,7 @@ def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
     if not weights:
         return float("nan"), float("nan")
     masses = np.array([weight @ force[span] for span, weight, _ in weights])
+    # Inverse variances: relative sd times the mass that each span weighs.
     share = (np.abs(masses) * [sd for *_, sd in weights]) ** -2
     return float(share @ masses / share.sum()), float(max(share.sum() ** -0.5, _WEIGHED * np.mean(masses)))
 
@@ -245,6 +252,7 @@ def slopes_of(trunk: Trunk, told: LagAndMass, total: Wrench, changes: Array, *, 
     if len(each):
         share = (np.abs(each[:, 0]) * [sd for *_, sd in weights]) ** -2
         share /= share.sum()
+        # Weights go with mass^-2: d(mean) / d m_i = share_i (1 - 2 (m_i - mean) / m_i).
         share *= 1 - 2 * (each[:, 0] - told.mass) / each[:, 0]  # a heavier span weighs less among all
         masses = share @ (each[:, 1:-1] + np.outer(each[:, -1], lags))
     return lags, masses
@@ -261,9 +269,11 @@ def _lag_slope(trunk: Trunk, time: Array, slow: Array, lag: float) -> Array:
         force, changed = found[:, 0], found[:, 1:]
         size = np.linalg.norm(force) * np.linalg.norm(wanted)
         alike.append(force @ wanted / size)
+        # d of f.w / (|f| |w|): through the product, less through the length of f.
         slopes.append(wanted @ changed / size - alike[-1] * (force @ changed) / (force @ force))
     bend, bends = np.diff(alike, 2)[0], np.diff(slopes, 2, axis=0)[0]
     fall, falls = alike[0] - alike[2], slopes[0] - slopes[2]
+    # Quotient rule of fall / bend.
     return np.asarray(0.5 * _STEP * (falls - fall / bend * bends) / bend) if bend < 0 else np.zeros_like(falls)
 
 
@@ -278,8 +288,10 @@ def fading(time: Array) -> tuple[Array, Array]:
     """
     lasts = time[-1] - time[0]
     edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
+    # Raised cosine: weight and slope are zero at both ends, so no boundary term is left.
     weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)
     bend = np.where(edge < 1, 0.5 * (np.pi / (_FADES * lasts)) ** 2 * np.cos(np.pi * edge), 0.0)
+    # Trapezoidal rule: half the way to either neighbour (twice, the factor cancels in the ratio).
     width = np.diff(time, prepend=time[:1]) + np.diff(time, append=time[-1:])
     total = width @ weight
     return width * weight / total, width * bend / total
@@ -388,6 +400,7 @@ def quiet_standing(
         com=com,
         forward=ahead,
         com_ahead=float(arm @ ahead),
+        # Left of forward is (-y, x).
         com_left=float(arm @ np.array([-ahead[1], ahead[0]])),
         feet=feet,
         foot_names=names,

@@ -27,6 +27,7 @@ def sitting(trial: Trial, soles: Soles, *, weight: float) -> Mask:
     load = total.cop(height=height, threshold=max(COP_FORCE, weight / 2))[:, :2]
     known = np.isfinite(load).all(axis=1) & np.isfinite(soles.outline).all(axis=(1, 2, 3))
     outline = soles.outline[known][..., :2].reshape(int(known.sum()), 2 * soles.outline.shape[2], 2)
+    # Both soles together: who sits has the load beside the hull of both feet.
     beside = np.zeros(found.size, dtype=bool)
     beside[known] = distance_to_hull(load[known], outline) > _BESIDE
     least = _LASTS / float(np.median(np.diff(soles.time)))

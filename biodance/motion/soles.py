@@ -62,6 +62,7 @@ def soles_from_markers(markers: Markers, marker_set: MarkerSet) -> Soles:
                 f"The {side} foot has no heel or no toe marker, so its contact with the ground is unknown. Put both on."
             )
         ahead = (toe - heel) * np.array([1.0, 1.0, 0.0])
+        # A quarter turn to the left in the plane.
         to_left = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(ahead))], axis=1)
         rise = (toe - heel) - ahead
         feet.append(np.stack([heel + x * ahead + y * to_left + min(x, 1.0) * rise for x, y in OUTLINE], axis=1))
@@ -99,8 +100,10 @@ def inside(plate: Plate, points: Array) -> Array:
     corners = plate.corners[:, :2]
     after = np.concatenate([corners[1:], corners[:1]])
     (x, y), (u, v) = corners.T, (after - corners).T
+    # Sign of the signed area: inward whichever way the corners run round.
     inward = np.sign(x @ after[:, 1] - y @ after[:, 0]) * np.array([-v, u]) / np.hypot(u, v)
     within = points[..., :2] @ inward - (x * inward[0] + y * inward[1])
+    # Inside a convex plate is inside all four edges: the least of the distances.
     return np.asarray(reduce(np.minimum, np.moveaxis(within, -1, 0)))
 
 
@@ -142,6 +145,7 @@ def distance_to_hull(point: Array, points: Array) -> Array:
     for rows in np.split(outside, range(_BLOCK, len(outside), _BLOCK)):
         start = towards[rows][:, i]
         chord = towards[rows][:, j] - start
+        # Foot of the perpendicular on a chord, kept between its ends.
         along = np.clip(-np.sum(chord * start, axis=2) / np.maximum(np.sum(chord**2, axis=2), 1e-18), 0, 1)
         distance[rows] = np.linalg.norm(start + along[..., None] * chord, axis=2).min(axis=1)
     return distance
@@ -179,6 +183,7 @@ def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight
         lifted = 0
         for start, stop in runs(rests[:, foot]):
             span = slice(start, stop)
+            # Median over the rest: one frame of a bad marker makes no level.
             level, over = float(np.median(low[span, foot])), _over(trial, soles.centre[span, foot], load[span])
             known = [height for height in plates if abs(height - level) < _SAME_LEVEL]
             if (over and known) or any(abs(height - level) < _SAME_LEVEL for height in bare):
@@ -225,9 +230,11 @@ def _offsets(trial: Trial, soles: Soles, rests: Mask, load: Mask) -> Array:
             found[foot] = np.percentile(standing, 10, axis=0)
     if np.isnan(found).all():
         z = soles.outline[..., 2]
+        # Without a loaded plate the lowest that a resting foot reaches stands for the ground.
         lowest = np.where(rests[..., None], z, np.inf).min(axis=(0, 1))
         lowest = np.where(np.isfinite(lowest), lowest, np.nanmin(z, axis=(0, 1), initial=np.inf))
         found[:] = lowest - min(plate.height for plate in trial.plates)
+    # A foot that never stood on a plate: as high as the other one.
     found = np.where(np.isnan(found), found[::-1], found)
     return np.minimum(found, found[::-1] + _ASYMMETRY)
 
@@ -327,6 +334,7 @@ def _samples(outline: Array) -> Array:
     outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
     length = np.linalg.norm(outwards, axis=-1, keepdims=True)
     narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards
+    # Corners and the middles of all pairs: points all over a convex sole.
     middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
     return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 

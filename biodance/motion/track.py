@@ -113,7 +113,7 @@ def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[S
     del values, before, behind, filtered  # what is derived needs the memory
     time = np.arange(even.shape[1]) / rate
     free = np.zeros(len(even))
-    ends = [(3, free), (4, free)]
+    ends = [(3, free), (4, free)]  # natural: third and fourth derivative vanish
     spline = make_interp_spline(time, even.T, k=_DEGREE, bc_type=(ends, ends))
     first, second = spline(time, nu=1).T, spline(time, nu=2).T
     return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
@@ -122,6 +122,7 @@ def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[S
 def _beyond(values: Array, period: int, count: int) -> Array:
     """Return ``count`` samples (m, count) that come before ``values`` (m, T), the nearest first."""
     slope = np.polynomial.polynomial.polyfit(np.arange(min(period, values.shape[1])), values[:, :period].T, 3)[1]
+    # x(-t) = x(t) - 2 slope t: the slope goes on, all else is mirrored, the acceleration too.
     return values[:, 1 : count + 1] - 2 * slope[:, None] * np.arange(1, count + 1)
 
 
@@ -155,6 +156,8 @@ def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array
     turn, back = quaternion_matrix(at.root.T), quaternion_conjugate(at.root.T)
     half = quaternion_product(back, first.root.T)
     omega = 2 * half[:, :3]
+    # 2 q* q'' has the rate of the quaternion's size in it, which a spline does not keep
+    # constant: 4 (q* q')_w taken off.
     alpha = 2 * quaternion_product(back, second.root.T)[:, :3] - 4 * half[:, 3:] * half[:, :3]
     linear = np.einsum("tji,jt->ti", turn, first.place)
     acceleration = np.einsum("tji,jt->ti", turn, second.place) - cross(omega, linear)
@@ -172,9 +175,10 @@ def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: A
     sine, cosine = np.sin(sign * angles[1]), np.cos(sign * angles[1])
     cosine = np.where(np.abs(cosine) < _LEAST_COSINE, np.copysign(_LEAST_COSINE, cosine), cosine)
     w, dw = _before_first(sign * angles[0], omega), _before_first(sign * angles[0], alpha)
+    # In the frame after the first angle w = (rate1 + sin t2 rate3, rate2, cos t2 rate3).
     rate3 = w[2] / cosine
     rate1 = w[0] - sine * rate3
-    dw = dw - rate1 * np.stack([np.zeros_like(rate1), -w[2], w[1]])
+    dw = dw - rate1 * np.stack([np.zeros_like(rate1), -w[2], w[1]])  # it turns with rate1 e1
     second3 = (dw[2] + sine * w[1] * rate3) / cosine
     second1 = dw[0] - cosine * w[1] * rate3 - sine * second3
     return sign * np.stack([rate1, w[1], rate3]), sign * np.stack([second1, dw[1], second3])
@@ -226,7 +230,7 @@ def _given(body: Body, columns: list[int]) -> tuple[Array, Array]:
     jacobian = general_jacobian(body, columns) * np.concatenate([np.ones(body.n_root), body.free])
     weight = body.markers.weight[columns] / error_size("soft_tissue", "marker") ** 2
     told = weight[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
-    span = np.maximum(body.limits.upper - body.limits.lower, 1e-3) / np.sqrt(12)
+    span = np.maximum(body.limits.upper - body.limits.lower, 1e-3) / np.sqrt(12)  # sd of a uniform density
     half = body.n_root // 2
     return told, np.concatenate([np.full(half, _ROOT[0]), np.full(half, _ROOT[1]), span]) ** -2
 
@@ -242,6 +246,7 @@ def _open(
     told, before = given
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     ever = shown.any(axis=0)
+    # Information of the markers seen, and of the prior; the last pattern has all markers that are ever shown.
     precision = np.tensordot(np.vstack([patterns, ever]).astype(float), told, axes=1) + np.diag(before)
     variance = np.diagonal(np.linalg.inv(precision), axis1=1, axis2=2)
     open_ = variance[:-1] - variance[-1] > _LARGEST_ADDED**2
@@ -479,6 +484,7 @@ def own_cutoff(at: Followed, settings: LowPass) -> float | None:
     noise = missed + max(0.0, float((power - missed)[fast].mean()))
     tried = np.arange(np.ceil(low / _STEP), np.floor(high / _STEP) + 1) * _STEP
     gains = (replace(settings, cutoff=float(cutoff)).gain(frequency, rate) for cutoff in tried)
+    # (1 - H)² (P - N) + H² N = (1 - H)² P + (2 H - 1) N.
     error = [float(np.sum((1 - gain) ** 2 * power + (2 * gain - 1) * noise)) for gain in gains]
     return round(float(tried[int(np.argmin(error))]), 1)
 

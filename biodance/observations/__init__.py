@@ -113,6 +113,7 @@ class Observation:
     @property
     def expected_sd(self) -> float:
         """Standard deviation of what is expected of one such observation in a recording without fault."""
+        # The parts of the expectation's error are independent: variances add.
         return float(np.sqrt(self.sd**2 + sum(size**2 for size in self.norms.values())))
 
     @property

@@ -71,6 +71,7 @@ def _about_centre(plate: Plate, slope: Array, zero: Array) -> Array:
     """Return the change B (6, 7) about the lab origin of ``slope`` (6, 6) @ wrench + ``zero`` (6,) about the centre of
     a plate.
     """
+    # About the centre, the fault there, and back about the origin.
     there, back = wrench_shift(plate.centre), wrench_shift(-plate.centre)
     return np.asarray(back @ np.column_stack([slope @ there, zero]))
 
@@ -83,6 +84,7 @@ def plate_change(effect: str, target: str, plate: Plate) -> Array:
     """
     name, _, place = target.rpartition(":")
     fault = PLATE_FAULTS.get(effect)
+    # A zero that was taken off the empty plate holds its offset already.
     taken_off = fault is OFFSET and was_zeroed(plate)
     if fault is None or fault is DELAY or not fault.is_target(target) or name not in ("", plate.name) or taken_off:
         return np.zeros((6, 7))
@@ -98,6 +100,7 @@ def sensitivities(seen: SeenTrial, found: Sequence[_Observed], effect: str, targ
     known = [one.sensitivity for one in found]
     if (effect, parameter) == (DELAY.name, DELAY.parameter):
         return np.array([one.delay for one in known])
+    # A mass that is carried weighs as an error of the declared one does.
     if (effect, parameter) in {(BodyMass.name, "error"), (AddedMass.name, "mass")}:
         return np.array([one.mass for one in known])
     if effect == ToeLandmark.name:
@@ -111,6 +114,7 @@ def sensitivities(seen: SeenTrial, found: Sequence[_Observed], effect: str, targ
         change = plate_change(effect, target, plate)
         out += [one.to(plate.name, change) for one in known]
         if fault is OFFSET and name in ("", plate.name) and was_zeroed(plate):
+            # What the reader took off is the offset itself, whatever the plate carries.
             out += [one.zero.get(plate.name, np.zeros(3)) @ fault.zero(place)[:3] for one in known]
     return out
 
@@ -148,7 +152,9 @@ def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str],
     found = {}
     for plate in seen.trial.plates:
         for k, name in enumerate(CHANNELS[:5]):
+            # The channels that end with the wrong sign: this one, or all but Fz.
             wrong = np.eye(6)[k] if name != "Fz" else 1 - np.eye(6)[k]
+            # w - 2 w: the sign is turned.
             change = _about_centre(plate, np.diag(-2 * wrong), np.zeros(6))
             found[AxisError.name, name if single else f"{plate.name}:{name}"] = plate.name, change
     return MappingProxyType(found)

@@ -29,6 +29,7 @@ class Track:
     @cached_property
     def speed(self) -> Array:
         """(n, T) m/s."""
+        # Second order in the middle, one-sided at the ends; differences go over gaps, too.
         return np.asarray(np.gradient(self.place, self.time, axis=1)) if self.time.size > 1 else 0.0 * self.place
 
     def at(self, time: Array) -> Array:
@@ -44,6 +45,7 @@ class Track:
             return np.full((time.size, len(values)), np.nan)
         out = np.stack([np.interp(time, self.time, one) for one in values], axis=1)
         after = np.minimum(np.searchsorted(self.time, time), self.time.size - 1)
+        # Distance in time to the nearer one of the two neighbouring frames.
         near = np.minimum(np.abs(time - self.time[after]), np.abs(time - self.time[np.maximum(after - 1, 0)]))
         out[near > _UNSEEN] = np.nan
         return out
@@ -102,6 +104,7 @@ class FootPath:
         """Return the sole (n, P, 2) m seen from above, from the heel marker and the front."""
         heel, front = (path[:, :2] for path in self.at(time))
         ahead = front - heel
+        # Up x ahead: to the left.
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
         return heel[:, None] + OUTLINE[:, :1] * ahead[:, None] + OUTLINE[:, 1:] * left[:, None]
 
@@ -121,8 +124,11 @@ class FootPath:
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
         outwards = -1.0 if self.side == "right" else 1.0
         axes = np.stack([ahead, outwards * left], axis=1)
+        # Rate of turn to the left: cross product of the markers' relative velocity with the foot's line.
         turns = np.sum(left * (speeds[1] - speeds[0]), axis=1) / length
+        # e_i (p - h).
         place = np.einsum("nij,nj->ni", axes, point - heel)
+        # d/dt of e_i (p - h) for a fixed p: e_i' (p - h) - e_i h', with ahead' = w left and left' = -w ahead.
         crosses = np.stack([place[:, 1], -place[:, 0]], axis=1) * outwards * turns[:, None]
         return InFoot(axes, place, crosses - np.einsum("nij,nj->ni", axes, speeds[0]), length)
 
@@ -201,6 +207,7 @@ def _foot(markers: Markers, set_name: str, side: str, heel: Array, toe: Array) -
     found = FootPath(side, markers.time, heel, toe, toe)
     if outer is None or not np.nanmedian(found.in_foot(markers.time, outer[:, :2]).place[:, 1]) > 0:
         return found
+    # Perpendicular to the line from heel to edge, towards the inside.
     along = (outer - heel)[:, :2]
     front = np.array(outer)
     front[:, :2] += _HALF_BREADTH * (1 if side == "right" else -1) * np.stack([-along[:, 1], along[:, 0]], axis=1)

@@ -40,6 +40,7 @@ class Sensitivity:
 
     def to(self, plate: str, change: Array) -> float:
         """Return the derivative with respect to the size of a ``change`` B (6, 7) of a plate."""
+        # <gradient, change>: chain rule, summed over all elements.
         return float(np.sum(self.plates[plate] * change)) if plate in self.plates else 0.0
 
 
@@ -47,6 +48,7 @@ def by_plate(gradient: Array, plates: Mapping[str, Array]) -> dict[str, Array]:
     """Return by plate the derivative (6, 7) with respect to B of a function of the sum of their wrenches (n, 6) about
     the lab origin, whose derivatives with respect to its samples are ``gradient`` (n, 6).
     """
+    # d/dB_ij is the derivative with respect to channel i times w_j (last column: 1), summed over the samples.
     return {name: np.column_stack([gradient.T @ wrench, gradient.sum(axis=0)]) for name, wrench in plates.items()}
 
 
@@ -56,6 +58,7 @@ def of_mean(wrench: Array, channel: int, weights: Array | None = None) -> Array:
     """
     out = np.zeros((6, 7))
     mean = wrench.mean(axis=0) if weights is None else weights @ wrench
+    # d(mean of channel i) / dB_ij: mean of w_j, and 1 for the constant.
     out[channel] = np.append(mean, 1.0 if weights is None else weights.sum())
     return out
 
@@ -65,6 +68,7 @@ def pressure_gradient(wrench: Array, direction: Array, height: float) -> Array:
     about the lab origin; the pressure x = (Fx h - My) / Fz, y = (Fy h + Mx) / Fz at ``height`` h m.
     """
     fx, fy, fz, mx, my, _ = wrench.T
+    # u / Fz: dx/dMy = -1 / Fz, dy/dMx = 1 / Fz, d(place)/dFz = -place / Fz.
     along_x, along_y = direction.T / fz
     place = (along_x * (fx * height - my) + along_y * (fy * height + mx)) / fz
     none = np.zeros_like(fz)

@@ -55,8 +55,10 @@ class StepCourse:
         if not known.size or known.mean() < _SEEN:
             return float("nan"), Sensitivity()
         at = np.arange(part.start, part.stop)[known]
+        # Mean over the known samples.
         gradient = pressure_gradient(self.wrench[at], self.foot.axes[at, axis], self.height) / at.size
         plates = by_plate(gradient, {name: wrench[at] for name, wrench in self.plates.items()})
+        # Late forces: the same pressure meets the foot of a later instant.
         delay = float(np.nan_to_num(self.foot.moves[at, axis]).mean())
         return float(self.foot.place[at, axis].mean()), Sensitivity(plates, delay=delay)
 
@@ -79,6 +81,7 @@ def _swings(foot: FootPath, marker: Track, middle: float, near: float, *, before
     """
     time = near + np.linspace(0.0, -_SWING if before else _SWING, 7)
     belt = foot.drift(np.linspace(middle - 0.1, middle + 0.1, 5))[:2]
+    # Relative to the belt, which would carry a standing foot along, too.
     place = marker.at(time)[:, :2] - belt * (time - near)[:, None]
     return bool(np.nan_to_num(np.linalg.norm(place - place[0], axis=1)).max() >= _SWUNG)
 
@@ -110,6 +113,7 @@ def crossing(wrench: Wrench, sample: int) -> tuple[float, Array]:
     if not np.isfinite(pair).all():
         return float(stop), np.zeros((6, 7))
     share = float((ONSET - pair[0, 2]) / rise)
+    # Implicit function: F(t) = 20 N gives dt = -dF / F', with dF between the samples in the same shares.
     return float(start + share * lasts), -lasts / rise * of_mean(pair, 2, np.array([1 - share, share]))
 
 

@@ -43,6 +43,8 @@ class Flight(Observer):
             if not inside.any() or wrench.force[:, 2].max() < 100.0:
                 continue
             lost = [wrench.force[a] - wrench.force[b - 1] for a, b in runs(inside)]
+            # d/dd of the mean of F(t - d): what every stretch loses from its beginning to its
+            # end, over its duration.
             late = np.sum(lost, axis=0) / np.count_nonzero(inside) * wrench.rate
             for axis, (channel, sd) in enumerate(_OWN.items()):
                 value, what = float(wrench.force[inside, axis].mean()), f"{plate.name} {channel} in flight"

@@ -59,6 +59,8 @@ class FootAcross(Observer):
             norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
             norms |= landmark_across(path, phase)
             value, responds = part.place(1, start, stop)
+            # A toe marker e inwards turns the foot's line by e / length: a pressure so far
+            # ahead moves out by ahead / length.
             own, lever = (sd**2 + step.overhang**2) ** 0.5, part.place(0, start, stop)[0] / part.length
             what = f"{step.name}, {phase}"
             found.append(

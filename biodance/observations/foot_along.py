@@ -50,6 +50,8 @@ class FootAlong(Observer):
             }
             value, responds = part.place(0, start, stop)
             own, beside = ((sd * part.length) ** 2 + step.overhang**2) ** 0.5, part.place(1, start, stop)[0]
+            # A heel marker e backwards adds e to the distance and share * e to what is expected of a longer foot;
+            # a toe marker e inwards turns the axis by e / length: the distance ahead loses beside * e / length.
             levers = {(step.side, "backwards"): 1 - share, (step.side, "inwards"): -beside / part.length}
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(

@@ -45,6 +45,7 @@ class FootOutline(Observer):
         if known.sum() < 5:
             return None
         distance = distance_to_hull(cop[known], sole[known])
+        # The one or two samples in the middle are the median; an odd number counts its own twice, hence the half.
         median = np.argsort(distance)[[(distance.size - 1) // 2, distance.size // 2]]
         at = np.flatnonzero(known)[median]
         gradient = pressure_gradient(wrench[at], _away(cop[at], sole[at]), plate.height) / 2
@@ -57,6 +58,7 @@ class FootOutline(Observer):
 
 def _away(point: Array, sole: Array) -> Array:
     """Return the direction (n, 2) in which the distance of points (n, 2) m from soles (n, P, 2) m grows; 0 inside."""
+    # Central differences along x and y.
     sides = [distance_to_hull(point + size * axis, sole) for axis in np.eye(2) for size in (-_NEAR, _NEAR)]
     slope = np.stack([sides[1] - sides[0], sides[3] - sides[2]], axis=1) / (2 * _NEAR)
     return np.asarray(np.where(distance_to_hull(point, sole)[:, None] > 0, slope, 0.0))

@@ -57,6 +57,7 @@ def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
     place: Array = foot.toe[np.argmin(np.abs(foot.time - middle)), :2]
     away = np.linalg.norm(foot.toe[:, :2] - place, axis=1)
     pull = np.full(away.size, np.nan)
+    # Second difference of the distance from where the toe stood.
     pull[1:-1] = (away[2:] - 2 * away[1:-1] + away[:-2]) * foot.rate**2
     here = np.flatnonzero(np.abs(foot.time - near) < 1.5 * _AROUND)
     if not here.size or not np.isfinite(pull[here]).all():

@@ -61,6 +61,7 @@ def heel_strike(foot: FootPath, middle: float, near: float) -> float:
     """
     height = foot.heel[:, 2]
     rise = np.full(height.size, np.nan)
+    # Second central difference: vertical acceleration.
     rise[1:-1] = (height[2:] - 2 * height[1:-1] + height[:-2]) * foot.rate**2
     stands = height[np.abs(foot.time - middle) < 0.05]
     if not np.isfinite(stands).any():
@@ -78,6 +79,7 @@ def _vertex(time: Array, value: Array, i: int) -> float:
     """Return the time of the top of the parabola through three samples around ``i``."""
     before, top, after = value[i - 1 : i + 2]
     bend = before - 2 * top + after
+    # Vertex of a parabola: half the first difference over the second one.
     return float(time[i] + (0.5 * (before - after) / bend if bend < 0 else 0.0) * (time[i + 1] - time[i]))
 
 

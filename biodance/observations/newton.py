@@ -69,6 +69,7 @@ def _slopes(seen: SeenTrial, told: LagAndMass) -> tuple[dict[str, Array], dict[s
     assert seen.trunk is not None
     lags, masses = {}, {}
     for plate in seen.trial.plates:
+        # Only the vertical force, row 2 of B, enters.
         lags[plate.name], masses[plate.name] = np.zeros((2, 6, 7))
         changes = np.column_stack([plate.wrench.value, np.ones(plate.wrench.time.size)])
         lags[plate.name][2], masses[plate.name][2] = slopes_of(

@@ -64,14 +64,18 @@ class Shear(Observer):
         inwards, turns = (-1 if axis and step.side == "right" else 1), (-1 if axis else 1) * path.turns
         part, middle, weight = course.part(start, stop), len(path.turns) // 2, float(course.force[:, 2].mean())
         share = np.zeros(len(path.turns))
+        # Mean over the part, in units of the weight over the whole stance.
         share[part] = inwards / max(part.stop - part.start, 1) / weight
         along = path.along(course.force)
+        # Force over weight: acceleration over g.
         per = inwards / seen.trial.settings.gravity
         gained, late = path.axes[middle] @ path.bending * per, path.axes[middle] @ path.bending_late * per
         value = float(share @ along[axis])
         gradient = np.zeros_like(course.wrench)
         gradient[:, :2] = share[:, None] * path.axes[:, axis]
+        # The weight in the denominator is a mean over all samples.
         gradient[:, 2] = -value / weight / len(gradient)
+        # Late forces meet axes that have turned on (ahead' = w left, left' = -w ahead), and a later bend of the way.
         delay = share @ (turns * along[1 - axis]) - late[axis] - turns[middle] * gained[1 - axis]
         responds = Sensitivity(by_plate(gradient, course.plates), delay=float(delay))
         return self._observation(seen, step, what, value - float(gained[axis]), (expected, sd, person), responds)
@@ -81,12 +85,15 @@ class Shear(Observer):
         ahead, left = path.along(course.force)
         X = np.stack([ahead, course.force[:, 2]], axis=1)
         beta, *_ = np.linalg.lstsq(X, left, rcond=None)
+        # d arctan(b) = db / (1 + b²), with db = e_0'(X'X)^-1 X' dy.
         first = np.linalg.pinv(X.T @ X)[0] / (1 + beta[0] ** 2)
         of_left = X @ first
+        # d beta = (X'X)^-1 (dX' r - X' dX beta), r the residual: the derivative with respect to both columns of X.
         of_ahead, of_vertical = (np.outer(left - X @ beta, first) - np.outer(of_left, beta)).T
         gradient = np.zeros_like(course.wrench)
         gradient[:, :2] = of_left[:, None] * path.axes[:, 1] + of_ahead[:, None] * path.axes[:, 0]
         gradient[:, 2] = of_vertical
+        # As the axes turn: ahead' = w left, left' = -w ahead.
         late = float(np.sum(path.turns * (of_ahead * left - of_left * ahead)))
         responds = Sensitivity(by_plate(gradient, course.plates), delay=late, linear=False)
         return self._observation(seen, step, "slant", float(np.arctan(beta[0])), _SLANT, responds)
@@ -118,6 +125,7 @@ class PelvisCourse:
 
     def along(self, force: Array) -> Array:
         """Return forces (n, 3) N ahead and to the left (2, n)."""
+        # e_i f of every sample.
         return np.asarray(np.einsum("nij,nj->in", self.axes, force[:, :2]))
 
 
@@ -128,7 +136,9 @@ def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> PelvisCourse | N
     if np.count_nonzero(here) < _FRAMES:
         return None
     known = np.hstack([path.place[:2, here].T, path.speed[:2, here].T])
+    # Parabolas of the place and of the velocity, each fitted on its own: the second one tells how the first bends.
     bend, speed, _ = np.linalg.lstsq(np.vander(path.time[here] - middle, 3), known, rcond=None)[0]
+    # Derivative of b t² + s t + c.
     both = speed + 2 * bend * (course.time - middle)[:, None]
     belt = seen.belt(step)
     velocity, late = both[:, :2] - (np.zeros(2) if belt is None else belt), both[:, 2:]
@@ -137,6 +147,7 @@ def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> PelvisCourse | N
         return None
     ahead = velocity / goes[:, None]
     left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    # left · ahead' = left · a / v: the rate at which the way turns.
     return PelvisCourse(np.stack([ahead, left], axis=1), np.sum(left * late, axis=1) / goes, 2 * bend[:2], 2 * bend[2:])
 
 

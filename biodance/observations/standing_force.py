@@ -45,12 +45,14 @@ class StandingForce(Observer):
         mass = force[2] / seen.trial.settings.gravity
         norms, trial = {"person declared mass": seen.mass_doubt}, seen.trial.name
         g = seen.trial.settings.gravity
+        # dm = dFz / g.
         weighs = Sensitivity({p.name: of_mean(_known(p), 2) / g for p in seen.trial.plates}, mass=1.0)
         found = [
             Observation(
                 self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms, sensitivity=weighs
             )
         ]
+        # The mean over T seconds scatters with 1 / sqrt(T), as independent seconds do.
         sd = _SWAY * weight / max(1.0, (total.time[-1] - total.time[0])) ** 0.5
         for axis, channel in enumerate(("Fx", "Fy")):
             value, own = float(force[axis]), {f"plate level along {'xy'[axis]}": _level(axis) * weight}

@@ -47,6 +47,7 @@ class StandingPlace(Observer):
         height = float(np.mean([plate.height for plate in plates]))
         pressure = seen.total.cop(height=height)[:, :2]
         known = np.isfinite(pressure).all(axis=1)
+        # What stands still is over its centre of pressure on average.
         away = np.nanmean(pressure, axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
         if not np.linalg.norm(away) <= _REACH:
             return ()

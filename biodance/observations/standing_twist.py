@@ -34,11 +34,13 @@ class StandingTwist(Observer):
         if not np.isfinite(place).all():
             return ()
         (x, y), mean = place.mean(axis=0), value.mean(axis=0)
+        # Moment about the vertical through (x, y): Mz - (x Fy - y Fx).
         twist, lasts = float(mean[5] - x * mean[1] + y * mean[0]), float(np.ptp(seen.total.time))
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * mean[2]]
         where, sd = loaded[0] if len(loaded) == 1 else "", _OWN * max(1.0, 1.0 / max(lasts, 1e-3))
         aside = np.tile([mean[1], -mean[0]], (len(value), 1))  # the twist loses this times the place of the pressure
         gradient = -pressure_gradient(value, aside, height) / len(value)
+        # What Mz, Fx and Fy do to it directly.
         gradient += np.array([y, -x, 0.0, 0.0, 0.0, 1.0]) / len(value)
         responds = Sensitivity(by_plate(gradient, {plate.name: plate.wrench.value for plate in plates}), linear=False)
         return (

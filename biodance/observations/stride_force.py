@@ -91,6 +91,7 @@ class StrideForce(Observer):
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
         if step.beside:
             here = np.flatnonzero(seen.swings(step, time[span])) + span.start
+            # From the first to the last sample of the swing, whatever lies between.
             span = slice(here[0], here[-1] + 1) if here.size else slice(0, 0)
         rate = seen.plate(step.plate).wrench.rate
         if span.stop - span.start < _SHORTEST * rate or _elsewhere(seen, span, step.plate, *step.beside).any():
@@ -117,6 +118,7 @@ class StrideForce(Observer):
         means = _means(seen, seen.total.time[span], _all_plates(seen, span))
         found = [_weighed(self.name, what, seen, means, "in a step", _STEP)]
         for axis, channel in enumerate(("Fx", "Fy")):
+            # Newton: the force that the pelvis' acceleration does not need.
             value, sd = float(means.force[axis] - seen.mass * means.moved[axis]), _HORIZONTAL * seen.mass * g
             late, heavier = -seen.mass * means.late[axis], float(means.moved[axis])
             responds = Sensitivity(means.plates(axis), delay=float(late), mass=heavier)
@@ -152,6 +154,7 @@ def _means(seen: SeenTrial, time: Array, by: Mapping[str, Array]) -> _Means:
     """
     share, bend = fading(time)
     path, speed = seen.pelvis_track.at(time), seen.pelvis_track.speed_at(time)
+    # Twice by parts: the mean of w x'' is that of w'' x; w'' sums to nothing, so a constant place does not count.
     moved, late = bend @ (path - path.mean(axis=0)), bend @ (speed - speed.mean(axis=0))
     force = sum((share @ wrench[:, :3] for wrench in by.values()), np.zeros(3))
     return _Means(force, moved, late, share, by)
@@ -167,9 +170,11 @@ def _weighed(
     """Return the mass kg whose weight and acceleration need the mean vertical force."""
     bias, sd, person = norm
     norms = {"person declared mass": seen.mass_doubt, f"person weighs {way}": person * seen.mass}
+    # F = m (g + a).
     per = float(seen.trial.settings.gravity + means.moved[2])
     value, expected = float(means.force[2]) / per, (1 + bias) * seen.mass
     plates = {one: slope / per for one, slope in means.plates(2).items()}
+    # d/dd of F / (g + a): -F / (g + a)² da/dd.
     responds = Sensitivity(plates, delay=-value / per * float(means.late[2]), mass=1 + bias)
     return Observation(
         name, what, seen.trial.name, value, sd * seen.mass, expected, "kg", plate, norms, sensitivity=responds
@@ -214,6 +219,7 @@ def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
     one, two = seen.stance(first), seen.stance(last)
     if one is None or two is None or two.start >= one.stop or first.overhang or last.overhang:
         return None
+    # From the middle of one stance to that of the other no third plate may carry anything.
     middle = slice((one.start + one.stop) // 2, (two.start + two.stop) // 2)
     begin = one.start + round(_ONE[0] * (one.stop - one.start))
     end = two.start + round(_ONE[1] * (two.stop - two.start))

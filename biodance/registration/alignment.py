@@ -62,6 +62,7 @@ class FramePose:
 
     def wrench(self, value: Array) -> Array:
         """Return wrenches (..., 6) about the file's origin as wrenches about the room's."""
+        # Both vectors turn about the file's origin; then the moment is taken to the room's.
         turned = np.concatenate([value[..., :3] @ self.turn.T, value[..., 3:] @ self.turn.T], axis=-1)
         return wrench_about_origin(turned, self.shift)
 
@@ -74,6 +75,7 @@ class FramePose:
         s.
         """
         x, y, yaw, delay = change
+        # The origin of the file goes round `about`, then all is shifted.
         turned = axis_rotation(_UP, np.array([yaw]))[0] @ (self.shift - about) + about
         return FramePose(self.delay + delay, self.yaw + yaw, turned + np.array([x, y, 0.0]))
 
@@ -199,16 +201,19 @@ class _Samples:
 
     def aligned(self) -> tuple[complex, complex, Array]:
         """Return turn and shift (complex) and the loss (n,) of every sample."""
+        # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
         weight = 1.0 / (1.0 + self.lift / _OUTLIER) ** 2
         for _ in range(_ROUNDS):
             centre, needed = (np.sum(weight * x) / weight.sum() for x in (self.cop, self.needed_cop))
             # the argument of sum conj(a) b is the turn that carries a onto b
             both = np.sum(weight * np.conj(self.cop - centre) * (self.needed_cop - needed)) / _PRESSURE**2
+            # Shear is a vector without a place: nothing is centred.
             both += np.sum(weight * np.conj(self.shear) * self.needed_shear) / _SHEAR**2
             turn = complex(np.exp(1j * np.angle(both)))
             apart = np.abs(self.needed_cop - needed - turn * (self.cop - centre)) ** 2 / _PRESSURE**2
             loss = apart + np.abs(self.needed_shear - turn * self.shear) ** 2 / _SHEAR**2 + self.lift
             weight = 1.0 / (1.0 + loss / _OUTLIER) ** 2
+        # p = turn (c - c0) + p0, so the shift is p0 - turn c0.
         return turn, complex(needed - turn * centre), loss / (1.0 + loss / _OUTLIER)
 
 
@@ -231,9 +236,11 @@ def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -
             "Are these the files of one trial?"
         )
     # The alignments that explain no less than those of the delays beside theirs.
+    # Ends count as lower than all: a peak may lie there.
     gain = np.array([-np.inf, *(one.gain for one in found), -np.inf])
     top = (gain[1:-1] >= gain[:-2]) & (gain[1:-1] >= gain[2:])
     peaks = sorted([one for one, is_top in zip(found, top, strict=True) if is_top], key=lambda one: -one.gain)
+    # Four times finer around the highest peak; the others are looked at as they are.
     fine = peaks[0].pose.delay + np.arange(-_STEP, 1.05 * _STEP, _STEP / 4)
     best = max(_scanned(motion, needed, forces, height, fine), key=lambda one: one.gain)
     return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > _APART))
@@ -244,6 +251,7 @@ def _scanned(
 ) -> Iterator[Alignment]:
     """Yield the best alignment of every delay."""
     if delays is None:
+        # All delays under which both share `_LEAST` at least.
         first, last = forces.time[0] - motion.time[-1] + _LEAST, forces.time[-1] - motion.time[0] - _LEAST
         delays = np.arange(first, last, _STEP)
     for delay in map(float, delays):
@@ -251,6 +259,7 @@ def _scanned(
         if samples is not None:
             turn, shift, loss = samples.aligned()
             pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
+            # The loss of a sample stays below `_OUTLIER`: each one that fits adds, none takes off.
             yield Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
 
 
@@ -259,10 +268,12 @@ def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height
     every = max(1, round(_EVERY * motion.rate))
     time, value = motion.time[::every], needed[::every]
     measured = forces.during(time + delay).sum(axis=0)
+    # The same threshold for both: a light foot has no usable centre of pressure.
     here = zero_moment_point(np.nan_to_num(measured), height=forces.height, threshold=2.5 * COP_FORCE)
     there = zero_moment_point(value, height=forces.height + height, threshold=2.5 * COP_FORCE)
     use = np.isfinite(measured).all(axis=1) & np.isfinite(here).all(axis=1) & np.isfinite(there).all(axis=1)
     if use.sum() * _EVERY < _LEAST:
         return None
+    # A plane as complex numbers: x + iy.
     a, b, c, d = (x[use, 0] + 1j * x[use, 1] for x in (here, measured, there, value))
     return _Samples(a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2)

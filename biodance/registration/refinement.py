@@ -74,6 +74,7 @@ def plate_steps(
     for number, plate in enumerate(forces.plates):
         recorded = plate.wrench
         for start, stop in runs(recorded.force[:, 2] > ONSET):
+            # Clock of the markers.
             time = recorded.time[start:stop] - pose.delay
             cut_off = start == 0 or stop == len(recorded.time)
             covered = time[0] - 0.1 > motion.time[0] and time[-1] < motion.time[-1]
@@ -94,6 +95,7 @@ def _foot(trial: Trial, contact: Contact, soles: Soles, number: int, time: Array
     """Return the foot (0 right, 1 left) that stands alone and whole on a plate in the middle of a step, or None."""
     length = time[-1] - time[0]
     middle = (contact.time > time[0] + 0.25 * length) & (contact.time < time[0] + 0.75 * length)
+    # Share of the middle half of the contact in which each foot is over this plate.
     over = contact.on_plate[middle, :, number].mean(axis=0)
     alone = [foot for foot in (0, 1) if over[foot] > 0.8 and over[1 - foot] < 0.2]
     if not middle.any() or not alone:
@@ -113,6 +115,7 @@ def _step(
     path = FootPath(SIDES[foot], frames, heel, toe, toe)
     under = path.in_foot(time, place[:, :2])
     ahead, beside = under.place.T
+    # (n, 2, 2) axes seen from above, with z = 0, as two (n, 3).
     forwards, outwards = np.moveaxis(np.pad(under.axes, ((0, 0), (0, 0), (0, 1))), 1, 0)
     phase = (time - time[0]) / (time[-1] - time[0])
     onset = time[0] - heel_strike(path, float(time.mean()), time[0])
@@ -138,6 +141,7 @@ class PoseEvidence:
 
     def less_sure(self, added: Array) -> "PoseEvidence":
         """Return the same with the covariance ``added`` (4, 4) of what its model does not know."""
+        # The information may be singular; the change is the least one that it asks for.
         covariance = np.linalg.pinv(self.information)
         change = covariance @ self.vector
         wider = np.linalg.inv(covariance + added)  # the change itself stays as it is
@@ -173,10 +177,13 @@ def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: 
     put = problem(body, (window,), shortest=_SHORTEST)
     found = model(put, candidates(put), known)
     rows = put.spectrum.rows((_columns(put.cases[0], about),)).reshape(-1, 4)
+    # The other rows (markers) do not feel where the plates lie.
     rows = np.concatenate([rows, np.zeros((len(put.target) - len(rows), 4))])
+    # What parameters and tolerances explain is projected out (Schur complement).
     vector, information = found.posterior.score(found.white(rows))
     return PoseEvidence(
         information + np.diag(_UNKNOWN**-2.0),
+        # residual + rows @ change is to vanish, hence the minus.
         -vector,
         float(found.posterior.residual @ found.posterior.residual) / len(found.posterior.y),
         put.wrench_rows,
@@ -188,12 +195,14 @@ def _columns(case: Case, about: Array) -> Array:
     wrench = case.trial.wrench.value
     force, up = wrench[:, :3], np.array([[0.0, 0.0, 1.0]])
     out = np.zeros((len(wrench), 6, 4))
+    # A shift of the plate adds shift x force to the moment.
     out[:, 3:, 0] = cross(np.array([[1.0, 0.0, 0.0]]), force)
     out[:, 3:, 1] = cross(np.array([[0.0, 1.0, 0.0]]), force)
     near = wrench_about_point(wrench, about)
     # a small turn about the vertical through `about`: both vectors change by e_z x themselves
     turned = np.concatenate([cross(up, near[:, :3]), cross(up, near[:, 3:])], axis=1)
     out[:, :, 2] = wrench_about_origin(turned, about)
+    # A later clock reads at t + delay: the derivative with respect to time.
     out[:, :, 3] = np.gradient(wrench, case.motion.time, axis=0)
     return out
 
@@ -223,9 +232,11 @@ def feet_pull(steps: tuple[PlateStep, ...], about: Array) -> PoseEvidence | None
     for i, one in enumerate(rows):
         for j, other in enumerate(rows):  # two rows covary by the product of the sds that they share
             covariance[i, j] += sum(sd * other.shared.get(key, 0.0) for key, sd in one.shared.items())
+    # Generalised least squares: value + slope @ change is to vanish, with V^-1 as weight.
     weight = np.linalg.inv(covariance)
     information, vector = slope.T @ weight @ slope, -slope.T @ weight @ value
     left = value + slope @ (np.linalg.pinv(information) @ vector)
+    # chi² over its degrees of freedom.
     free = max(1, len(rows) - np.linalg.matrix_rank(slope))
     return PoseEvidence(information, vector, float(left @ weight @ left) / free, len(rows))
 
@@ -239,11 +250,13 @@ def _rows(step: PlateStep, about: Array) -> list[_Row]:
             rows.append(_mean(step, step.beside, step.outwards, (start, stop), expected, own, shared, about))
     for number, (start, stop, share, *sds) in enumerate(_ALONG if heel_first else ()):
         own, person, laboratory = (sd * step.length for sd in sds)
+        # Both parts are shared by the same rows here: one number.
         shared = {f"along {number}": float(np.hypot(person, laboratory))}
         expected = share * step.length
         rows.append(_mean(step, step.ahead, step.forwards, (start, stop), expected, own, shared, about))
     if heel_first:
         expected, own, laboratory = ONSET_AFTER_STRIKE
+        # The contact is at (time of the file - delay): a later clock brings it forward.
         rows.append(_Row(step.onset - expected, np.array([0.0, 0.0, 0.0, -1.0]), own, {"onset": laboratory}))
     return rows
 
@@ -263,8 +276,10 @@ def _mean(
     if not here.any():
         return _Row(np.nan, np.zeros(4), own, shared)
     arm = step.place[here] - about
+    # e_z x arm: what one radian moves the pressure by.
     turned = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
     along = axis[here, :2]
+    # Mean displacement along the axis for x, y and yaw; the delay is left out.
     slope = np.array([*along.mean(axis=0), np.einsum("ti,ti->t", along, turned).mean(), 0.0])
     return _Row(float(values[here].mean()) - expected, slope, own, shared)
 
@@ -340,6 +355,7 @@ def with_height(pose: FramePose, soles: Soles, forces: Forces) -> FramePose:
     """Return the pose with the height that the soles on loaded plates ask for."""
     gaps = []
     low, slow = _lowest(soles), _slow(soles)
+    # Shift that lays the surface of the plate under the lowest point of the sole.
     for plate, value in zip(forces.plates, forces.during(soles.time + pose.delay), strict=True):
         there = zero_moment_point(pose.wrench(np.nan_to_num(value)), height=plate.height + pose.shift[2])
         away = np.linalg.norm((soles.centre - there[:, None])[..., :2], axis=2)
@@ -368,6 +384,7 @@ def refined(
         Neither the wrench nor the feet tell anything: no fully measured contact, no step.
     """
     pose, why = start, ""
+    # A prior of the change, centred at the present pose in every round: it damps, and holds what nobody sees.
     weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
     for turn in range(_ROUNDS):
         window, soles, about = _look(body, trial, motion, forces, pose)
@@ -384,10 +401,12 @@ def refined(
             )
         change, covariance = together([*pulls, weak])
         pose = pose.changed(change, about)
+        # Never after the first round: the linearisation was at the alignment.
         if turn and (np.abs(change) < 0.1 * np.sqrt(np.diag(covariance))).all():
             break
     seconds = float(window.use.sum() / window.motion.rate) if wrench is not None else 0.0
     notes = () if wrench is not None else (f"The wrench of the whole body was not used: {why}",)
+    # Beyond what the evidence knows: independent, so covariances add.
     covariance = covariance + np.diag(_INSTALLED**2)
     fit = (wrench.misfit, wrench.rows) if wrench else (float("nan"), 0)
     return Refined(pose, covariance, about, seconds, len(steps), feet.misfit if feet else np.nan, *fit, notes)
@@ -416,6 +435,7 @@ def _carried(body: Body, window: TrialWindow) -> Mask:
     """
     needed, force = predict_wrench(body, window.motion).force[:, 2], window.trial.wrench.force[:, 2]
     apart = np.abs(force - needed) > _TENTH * abs(float(body.gravity[2])) * float(body.sip.mass.sum())
+    # Frames within `_AROUND` of a wrong one are left out, too.
     return ~dilate(apart | (force < _PRESSED), int(np.ceil(_AROUND * window.motion.rate)))
 
 
@@ -424,14 +444,18 @@ def _honest(pull: PoseEvidence, window: TrialWindow) -> PoseEvidence:
     where it fits badly.
     """
     with np.errstate(invalid="ignore"):
+        # Root mean square over time of each marker, then the first quartile over the markers.
         away = np.nanquantile(np.sqrt(np.nanmean(window.motion.residual**2, axis=0)), 0.25)
     real = away > _LIKE_MODEL * error_size("marker_distance", "first quartile", state="after")
     longest = max((stop - start for start, stop in runs(window.use)), default=0) / window.motion.rate
     worse = max(1.0, pull.misfit)
+    # Information over misfit: covariances grow with the mean square of the whitened rows.
     scaled = replace(pull, information=pull.information / worse, vector=pull.vector / worse)
     if real or longest < SHORTEST_RUN:
         few = np.array([1.0, 1.0, max(1.0, _FEW / pull.rows), 1.0])
         return scaled.less_sure(worse * np.diag((few * _REAL) ** 2))
+    # Mean horizontal direction of the pelvis' x axis.
     ahead = quaternion_matrix(window.motion.q[:, 3:7])[:, :2, 0].mean(axis=0)
     forwards = np.array([*ahead / max(float(np.linalg.norm(ahead)), 1e-9), 0.0, 0.0])
+    # Only along that direction: a matrix of rank one.
     return scaled.less_sure(_AHEAD**2 * np.outer(forwards, forwards))

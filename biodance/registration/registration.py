@@ -42,6 +42,7 @@ def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refin
         return False
     if abs(other.pose.delay - found.pose.delay) < _SAME:
         return False
+    # Log likelihood ratio: half the difference of the sums of squares (mean square times rows).
     worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
     return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > _CLEARLY)
 
@@ -192,6 +193,7 @@ class Registration:
 
 def _within(angle: float) -> float:
     """Return an angle between -pi and pi."""
+    # Through the unit circle: wraps to (-pi, pi].
     return float(np.angle(np.exp(1j * angle)))
 
 
@@ -255,6 +257,7 @@ def _rivalry(best: Alignment, other: Alignment) -> str:
 
 def _too_wide(covariance: Array, limits: Limits) -> str:
     """Return what is known less exactly than asked for (90 %); "" where nothing is."""
+    # Principal axes of the horizontal error ellipse; eigenvalues ascend, so the better known one is first.
     across, along = np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]))
     yaw, delay = np.sqrt(np.diag(covariance)[2:])
     rows = [
@@ -280,8 +283,10 @@ def _placed(plate: Plate, loaded: bool, found: Refined) -> PlacedPlate:
     x, y = (centre - found.about)[:2]
     # by how much the plate's own centre moves with x, y, yaw and delay of the pose
     slope = np.array([[1.0, 0.0, -y, 0.0], [0.0, 1.0, x, 0.0]])
+    # Variance of a linear function: slope C slope'.
     flat = np.sqrt(np.diag(slope @ found.covariance @ slope.T))
     right = found.pose.points(plate.corners)
+    # From the middle of corners 1 and 2 to that of 0 and 3: the plate's x.
     axis = right[[0, 3]].mean(axis=0) - right[[1, 2]].mean(axis=0)
     sd = np.array([*flat, HEIGHT_SD])
     yaw_sd = float(np.sqrt(found.covariance[2, 2]))

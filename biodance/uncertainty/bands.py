@@ -56,6 +56,7 @@ class Bands:
         """
         if self.white:
             return np.zeros(count, dtype=np.intp)
+        # Coefficient k of the DCT-II of n samples is a cosine of k half periods in n / rate seconds.
         frequency = np.arange(count) * self.rate / (2 * count)
         band = np.searchsorted(self.edges, frequency, side="right") - 1
         return np.where(frequency < self.edges[-1], band, -1)

@@ -32,12 +32,14 @@ def widened_prior(prior: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     that are turned and centres that are displaced: as far as the functional calibration that ``calibrated`` the joints
     leaves them, or as joints usually are.
     """
+    # The body's own spread, that of masses, and joint centres; per segment then first and second order of its frame.
     covariance = np.array(prior.covariance) + _mass_spread(prior) + misplaced(prior, calibrated)
     for i, segment in enumerate(prior.segments):
         cut = slice(10 * i, 10 * i + 10)
         phi, own = prior.phi[cut], covariance[cut, cut].copy()
         if phi[0] <= 0:
             continue
+        # First order: (10, 3) slope times the standard deviation of each axis, S S' its covariance.
         slope = _turn_slope(phi) * frame_turn(segment)
         covariance[cut, cut] = own + slope @ slope.T + _displacement(phi, own)
     return Sip(prior.segments, prior.phi, covariance)
@@ -59,6 +61,7 @@ def misplaced(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
     out = np.zeros((len(sip.phi), len(sip.phi)))
     for i, segment in enumerate(sip.segments):
         cut = slice(10 * i, 10 * i + 10)
+        # Isotropic error of the centre: slope S of (10, 3), covariance (sd S)(sd S)'.
         slope = _centre_size(segment, names) * shift_slope(sip.phi[cut])
         out[cut, cut] = slope @ slope.T
     return out
@@ -86,9 +89,12 @@ def from_true_centres(sip: Sip, table: Sip, calibrated: tuple[JointError, ...]) 
     """
     if not calibrated:
         return about_true_centres(sip)
+    # In units of the standard deviations: kg and kg·m² differ by orders, and rcond would cut the small ones.
     off, scale = misplaced(table, calibrated), np.sqrt(np.diag(table.covariance))
+    # A parameter that is held fixed (no variance) stays out of the inverse.
     unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
     inverse = np.linalg.pinv(table.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
+    # P^-1 B, of which K B = D P^-1 B is `shared`; 1 - P^-1 B = T' is `told`.
     kept = unit[:, None] * inverse * unit @ sip.covariance
     shared, told = off @ kept, np.eye(len(off)) - kept
     return Sip(
@@ -103,6 +109,7 @@ def _beyond(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
     left = {error.joint: error.centre for error in calibrated}
     out = np.zeros((len(sip.phi), len(sip.phi)))
     for i, segment in enumerate(sip.segments):
+        # Independent errors: only the variance beyond what is counted already.
         more = left.get(_joint_of(segment), 0.0) ** 2 - _centre_size(segment, set(left)) ** 2
         cut = slice(10 * i, 10 * i + 10)
         slope = np.sqrt(max(more, 0.0)) * shift_slope(sip.phi[cut])
@@ -151,6 +158,7 @@ def shift_slope(phi: Array) -> Array:
     inertia about the origin change.
     """
     out = np.zeros((10, 3))
+    # dh = m d, and dI = 2 (h.d) 1 - h d' - d h' (parallel axes to first order, h the first moments).
     out[1:4] = phi[0] * np.eye(3)
     for row, (i, j) in enumerate(TENSOR, start=4):
         out[row] = 2 * phi[1:4] * (i == j)
@@ -168,6 +176,7 @@ def _mass_spread(prior: Sip) -> Array:
     least = error_size("segment_mass", "floor") * np.array(
         [0.0 if name in prior.measured else _averaged(name) for name in prior.segments]
     )
+    # Only what lacks to the floor, in quadrature; what is held fixed, or has no mass, stays as it is.
     missing = np.sqrt(np.maximum(least**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
     names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
     sides = error_size("left_right_correlation", "mass")
@@ -175,8 +184,10 @@ def _mass_spread(prior: Sip) -> Array:
         [[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)]
     )
     masses = alike * np.outer(missing * mass, missing * mass)
+    # Conditioned on the total mass, known to `scale`: M - M 1 1' M / (1' M 1 + s²).
     total = masses.sum(axis=1)
     masses = masses - np.outer(total, total) / (total.sum() + error_size("scale", "mass") ** 2)
+    # All ten parameters of a segment scale with its mass: d phi = (phi / m) dm.
     return np.asarray(
         np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10))
     )
@@ -191,6 +202,7 @@ def _averaged(segment: str) -> float:
     if len(parts) < 2:
         return 1.0
     mass = np.array([read_segment_table(BASE).value(part, "mass", sex="M") for part in parts])
+    # Independent relative errors e of parts: sd(sum m e) / sum m = e |m| / sum m.
     return float(np.linalg.norm(mass) / mass.sum())
 
 
@@ -201,6 +213,7 @@ def _turn_slope(phi: Array) -> Array:
         inertia[i, j] = inertia[j, i] = value
     out = np.zeros((10, 3))
     for axis, S in enumerate(skew(np.eye(3))):
+        # dh = rho x h, and dI = S I + I S' = S I - I S with S = [rho]x.
         out[1:4, axis] = S @ phi[1:4]
         change = S @ inertia - inertia @ S
         out[4:, axis] = [change[i, j] for i, j in TENSOR]
@@ -222,11 +235,14 @@ def _displacement(phi: Array, own: Array) -> Array:
     """
     mass, com = phi[0], phi[1:4] / phi[0]
     slope = np.zeros((3, 10))
+    # dc = (dh - c dm) / m.
     slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass
     spread = slope @ own @ slope.T
     forms = mass * _FORMS @ spread
+    # For q_k = d'F_k d / 2: mean tr(F_k) / 2, covariance of q_k and q_l tr(F_k F_l) / 2 (normal d).
     mean = 0.5 * np.einsum("kii->k", forms)
     variance = 0.5 * np.einsum("kij,lji->kl", forms, forms)
     out = np.zeros((10, 10))
+    # Second moment about zero: the displacement adds inertia on average, and the values keep those of the prior.
     out[4:, 4:] = variance + np.outer(mean, mean)
     return out

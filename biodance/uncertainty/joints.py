@@ -67,10 +67,12 @@ class Centre(_Carried):
 
     def _own(self, trial: Response) -> Iterator[Array]:
         for (on, _), drift in self._drifts(trial):
+            # All that hangs is carried by one displacement: its functionals may be summed before.
             yield trial.place[:, on].sum(axis=1) @ drift
 
     def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for (_, rows), drift in self._drifts(trial):
+            # Every marker moves by the same (3, 3): repeated for the three rows of each.
             yield np.tile(drift, (1, rows.size // 3, 1)), rows
 
     def _drifts(self, trial: Response) -> Iterator[tuple[tuple[Index, Index], Array]]:
@@ -87,6 +89,7 @@ class Centre(_Carried):
         rest, found = poses(self.body, self.body.neutral), []
         for chain in chains(self.body):
             child = self.body.joints[chain[-1]].segment
+            # child_R_parent = R_child' R_parent.
             neutral = rest.rotation[0, child].T @ _above(self.body, rest, chain[0])[0]
             found.append((chain, _hanging(self.body, chain[0]), neutral))
         return tuple(found)
@@ -108,6 +111,7 @@ class Tilt(_Carried):
 
     def _own(self, trial: Response) -> Iterator[Array]:
         for joint, (on, _), turn in self._turns(trial):
+            # A turn r about the joint's centre displaces a CoM by r x arm = -[arm]x r, and turns its segment by r.
             arm = skew(trial.com[:, on] - trial.pose.joint_position[:, joint, None])
             yield (trial.turn[:, on] - trial.place[:, on] @ arm).sum(axis=1) @ turn
 
@@ -119,6 +123,7 @@ class Tilt(_Carried):
     def _turns(self, trial: Response) -> Iterator[tuple[int, tuple[Index, Index], Array]]:
         """Yield for every hinge its joint, what hangs on it, and (F, 3, 2) rad of its turn, lab, per radian of tilt."""
         for joint, hanging, across in self._hinges:
+            # A hinge's axis off by e turns what hangs on it by angle * e (first order in the angle).
             yield joint, hanging, trial.angles[:, joint, None, None] * (trial.pose.joint_rotation[:, joint] @ across)
 
     @cached_property
@@ -132,6 +137,7 @@ def _hanging(body: Body, joint: int) -> tuple[Index, Index]:
     """Return the segments that hang on a joint, and the rows of their markers among 3M."""
     hangs = below(body)[joint] > 0
     markers = np.flatnonzero(hangs[list(body.markers.segment)])
+    # Rows of marker k among 3M: 3k, 3k + 1, 3k + 2.
     return np.flatnonzero(hangs), (3 * markers[:, None] + np.arange(3)).ravel()
 
 
@@ -148,6 +154,7 @@ def _above(body: Body, at: Poses, joint: int) -> Array:
 
 def _across(axis: Array) -> list[Array]:
     """Return two unit vectors square to ``axis``."""
+    # The unit vector farthest from the axis: the cross product is never near zero.
     first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     first /= np.linalg.norm(first)
     return [first, np.cross(axis, first)]

@@ -46,6 +46,7 @@ def moments_of(parts: Array, band: NDArray[np.intp], bands: int) -> Moments:
     """
     residual = np.zeros((bands, 6, 6))
     for b in range(bands):
+        # (6, m (1 + k)): sum of r r' and of the outer products of the square root's columns, in one product.
         here = parts[band == b].transpose(1, 0, 2).reshape(6, -1)
         residual[b] = here @ here.T
     return Moments(residual, np.bincount(band, minlength=bands)[:bands].astype(float))
@@ -57,8 +58,10 @@ def noise_of(found: Moments, *, start: Array | None = None, worth: float = 0.0) 
     """
     mean = found.residual / np.maximum(found.count, 1)[:, None, None]
     if start is not None:
+        # Shrunk to `start` as if that had been seen in `worth` coefficients (conjugate prior mean).
         weight = (found.count / (found.count + worth))[:, None, None]
         mean = weight * mean + (1 - weight) * start
+    # Symmetric again after rounding: Cholesky takes one half only, others do not.
     return np.asarray(0.5 * (mean + np.swapaxes(mean, 1, 2)) + floor())
 
 
@@ -81,6 +84,7 @@ def maximise(
     found = start
     for _ in range(rounds):
         fresh = improved(found)
+        # Log-determinants do not depend on units: forces and moments count alike.
         change = np.abs(np.linalg.slogdet(covariance(fresh))[1] - np.linalg.slogdet(covariance(found))[1]).max()
         found = fresh
         if change < tolerance:
@@ -100,6 +104,7 @@ def sizes_of(rows: Sequence[tuple[str, str, float, float]]) -> tuple[dict[str, f
     square: dict[str, list[float]] = {}
     for key, name, value, variance in rows:
         centre = means.get(name, 0.0)
+        # E[(b - mean)²] under the posterior: square of its mean's distance plus its variance.
         square.setdefault(key, []).append((value - centre) ** 2 + variance + (MEAN_DOUBT * centre) ** 2)
     return means, {key: float(np.sqrt(np.mean(some))) for key, some in square.items()}
 
@@ -108,5 +113,6 @@ def _agreed(pairs: Array) -> float:
     """Return the mean of values with variances (n, 2); 0 where it may be chance."""
     value, variance = pairs.T
     mean = float(value.mean())
+    # Standard error of the mean: scatter of the values and their own variance over n - 1.
     error = np.sqrt(np.mean((value - mean) ** 2 + variance) / max(len(value) - 1, 1))
     return mean if len(value) > 2 and abs(mean) > AGREED * error else 0.0

@@ -54,6 +54,7 @@ class Noise:
             return np.asarray(np.linalg.solve(np.linalg.cholesky(self.covariance[0]), shifted))
         band = self.bands.of(len(rows))
         keep = band >= 0
+        # L^-1 with S = L L' per band: L^-1 r has unit covariance, L^-T L^-1 = S^-1.
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
         return inverse[band[keep]] @ self.bands.coefficients(shifted)[keep]
 
@@ -65,7 +66,9 @@ class Noise:
         if self.bands.white:
             return np.asarray(self.shift.T @ (inverse[0] @ (self.shift @ rows)))
         spectrum = self.bands.coefficients(self.shift @ rows)
+        # Bands that do not count have no information: S^-1 = 0 there.
         spectrum[band < 0] = 0.0
         for one in np.unique(band[band >= 0]):
             spectrum[band == one] = inverse[one] @ spectrum[band == one]
+        # Transposes of shift and transform (the inverse transform, as it is orthonormal), in reverse order.
         return np.asarray(self.shift.T @ self.bands.samples(spectrum))

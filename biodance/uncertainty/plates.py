@@ -65,9 +65,12 @@ def plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> Ar
     """Return the errors (T, 6, m) about the lab origin of plates that measure ``wrench`` (T, 6), at ``rate`` Hz,
     described about the point of ``noise``.
     """
+    # Wrench about the noise's point; (T, 6) rows, hence the transpose.
     near = wrench @ noise.shift.T
+    # A clock late by d measures w(t - d), to first order w - d dw/dt.
     late = np.gradient(near, 1.0 / rate, axis=0)[..., None] * plates.delay
     return np.asarray(
         np.linalg.inv(noise.shift)
+        # sum_j mixing[m, i, j] near[t, j] as (T, m, i), then (T, i, m).
         @ (np.tensordot(near, plates.mixing, axes=(1, 2)).swapaxes(1, 2) + plates.offset.T - late)
     )

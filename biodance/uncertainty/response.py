@@ -91,19 +91,23 @@ class Response:
     @cached_property
     def follow(self) -> Array:
         """(F, nv, 3M): coordinates per marker displacement, least squares weighted by the body's marker weights."""
+        # dq = -(J'DJ)^-1 J'D x: the coordinates undo what the model's markers moved.
         return np.asarray(-np.linalg.solve(*self._tracking))
 
     @cached_property
     def answer(self) -> Array:
         """(F, 9, 3M): functionals per marker displacement, ``tangent @ follow`` without `follow`."""
         normal, weighted = self._tracking
+        # Solved for the nine functionals instead of 3M markers; the normal matrix is symmetric.
         return -np.swapaxes(np.linalg.solve(normal, np.swapaxes(self.tangent, 1, 2)), 1, 2) @ weighted
 
     @cached_property
     def _tracking(self) -> tuple[Array, Array]:
         """Return the normal matrices (F, nv, nv) of the tracking, with a ridge, and J' D (F, nv, 3M)."""
+        # (J'D) (F, nv, 3M); every marker's weight holds for its three rows.
         weighted = np.swapaxes(np.repeat(self.body.markers.weight, 3)[:, None] * self.J, 1, 2)
         normal, nv = weighted @ self.J, self.body.nv
+        # In proportion to the mean diagonal of J'DJ: the same share at any number and weight of markers.
         ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / nv
         return normal + ridge * np.eye(nv), weighted
 
@@ -130,6 +134,7 @@ class Response:
 
     def left(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
         """Return what is left of all markers (F, 3M, K) m where model markers ``rows`` ``moved`` (F, R, K) m."""
+        # J dq + x: what the coordinates' answer does not undo.
         left = self.J @ (self.follow[:, :, rows] @ moved)
         left[:, rows] += moved
         return np.asarray(left)
@@ -139,9 +144,11 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, _, size = functional.shape
         flat, value = functional.reshape(frames, -1), np.zeros((frames, 6 * size))
+        # F2 y: all six rows, twice differentiated; F1 y: moments alone, once.
         second.add(self.motion.rate**2, flat[:, : 6 * size], value)
         first.add(self.motion.rate, flat[:, 6 * size :], value[:, 3 * size :])
         wrench = value.reshape(frames, 6, size)
+        # The forces of F2 y are m u: moment g x m u, not differentiated.
         wrench[:, 3:] += skew(self.body.gravity) @ functional[:, :3]
         return wrench
 
@@ -150,7 +157,7 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, _, size = weight.shape
         flat, value = weight.reshape(frames, -1), np.zeros((frames, 9 * size))
-        second.add_transposed(self.motion.rate**2, flat, value[:, : 6 * size])
+        second.add_transposed(self.motion.rate**2, flat, value[:, : 6 * size])  # transposes of F2, then F1
         first.add_transposed(self.motion.rate, flat[:, 3 * size :], value[:, 6 * size :])
         back = value.reshape(frames, 9, size)
         back[:, :3] += skew(self.body.gravity).T @ weight[:, 3:]
@@ -199,6 +206,7 @@ def derivatives(count: int) -> tuple[Banded, Banded]:
     """
     some = min(count, 2 * _REACH + 1)
     time = np.arange(some, dtype=float)
+    # A spline is linear in its samples: those of the unit vectors are the columns of the operator.
     spline = make_interp_spline(time, np.eye(some), k=min(5, some - 1))
     second, first = (Banded.of(_lengthened(spline.derivative(order)(time), count)) for order in (2, 1))
     return second, first
@@ -211,6 +219,7 @@ def _lengthened(rows: Array, count: int) -> csr_array:
     if not more:
         return csr_array(rows)
     first, last = csr_array(rows[:_REACH]), csr_array(rows[_REACH + 1 :])
+    # Row j of the middle has the same numbers from column j on (Toeplitz).
     middle = diags_array(list(rows[_REACH]), offsets=range(len(rows)), shape=(more + 1, count))
     first.resize((_REACH, count))
     last = hstack([csr_array((_REACH, more)), last])
@@ -233,6 +242,7 @@ def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
     place[:, :, 3:6] = mass * skew(com)
     place[:, :, 6:] = -2 * mass * skew(np.gradient(com, 1.0 / motion.rate, axis=0))
     turn[:, :, 3:6] = inertia
+    # -L x r - I' r with I' = [w]x I - I [w]x, the rate of the inertia in lab axes.
     turn[:, :, 6:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
     return place, turn
 
@@ -243,6 +253,7 @@ def central_inertia(body: Body) -> Array:
     tensor = np.empty((len(table), 3, 3))
     for column, (i, j) in enumerate(TENSOR, start=4):
         tensor[:, i, j] = tensor[:, j, i] = table[:, column]
+    # Parallel axes back to the CoM: I - m (|c|² 1 - c c').
     square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
     return np.asarray(tensor - table[:, 0, None, None] * square)
 
@@ -275,6 +286,7 @@ class ErrorSource(ABC):
         """Return (K, p): sum over time of what ``back`` (F, 9, p) weighs on functionals, times those of every
         error.
         """
+        # sum over frames and functionals: [f, i, k] with [f, i, p] to [k, p].
         return np.tensordot(self.functional(trial), back, axes=((0, 1), (0, 1)))
 
     @abstractmethod
@@ -291,4 +303,5 @@ def mean_local(trial: Response, residual: Array, weight: Array) -> Array:
 
 def mean_squares(left: Array) -> Array:
     """Return (K,) mean square distance of markers that are ``left`` (F, 3M, K) m from the model."""
+    # Mean over 3M coordinates times three: per marker a squared distance.
     return np.asarray(3 * np.mean(left**2, axis=(0, 1)))

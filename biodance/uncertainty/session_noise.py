@@ -43,10 +43,12 @@ def white_noise(samples: Array) -> Array:
     """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN where there are
     too few.
     """
+    # Cubic movement vanishes in the fourth difference; white noise keeps sqrt(1 + 16 + 36 + 16 + 1) = sqrt(70).
     change = np.abs(np.diff(samples, n=_ORDER, axis=0))
     enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
     value = np.full(samples.shape[1:], np.nan)
     if enough.any():
+        # Median of absolute values, as sudden movement and exchanged labels are no noise.
         value[enough] = NORMAL_OVER_MEDIAN / _GAIN * np.nanmedian(change[:, enough], axis=0)
     return value
 
@@ -75,7 +77,9 @@ def plate_noise(plates: Iterable[Plate]) -> Array:
         time, value, centre = one.wrench.time, one.wrench.value, one.centre
         if time.size < _ENOUGH + _ORDER:
             continue
+        # Moment about the plate's centre: M - c x F.
         local = np.concatenate([value[:, :3], value[:, 3:] - np.cross(centre, value[:, :3])], axis=1)
+        # Density: variance over half the sampling rate, sd / sqrt(rate / 2) = sd sqrt(2 dt).
         found.append(white_noise(local) * np.sqrt(2 * float(np.median(np.diff(time)))))
     return np.min(np.nan_to_num(found), axis=0) if found else np.zeros(6)
 
@@ -89,9 +93,11 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     pose = poses(body, q[None])
     segment = list(body.markers.segment)
     points = pose.points(segment, body.markers.position)
+    # Least squares with weights W: dq = (J'WJ)^-1 J'W x, with `_LEVER`² (m² per rad²) as a ridge.
     place = place_jacobian(body, pose, segment, points)
     weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
     followed = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv)) @ weighted.T
+    # (6, 3M) to (M, 6, 3): each marker's own covariance, its three coordinates independent.
     return _powers(*((one @ followed).reshape(6, -1, 3).swapaxes(0, 1) for one in _felt(body, q, about)))
 
 
@@ -111,13 +117,18 @@ def of_unseen_joints(body: Body, postures: Array, about: Array) -> Array:
     names, at = [body.joints[k].name for k in hidden], [body.n_root + k for k in hidden]
     bent = np.zeros(body.nq)
     bent[[body.nq - len(body.joints) + k for k in hidden]] = [_unseen(name, "mean") for name in names]
+    # Bent both ways, so that the mean over postures has no side.
     every = np.concatenate([postures, postures + bent, postures - bent])
     felt = [[one[:, at].T[:, :, None] for one in _felt(body, q, about)] for q in every]
     each = np.mean([_powers(*one) for one in felt], axis=0)
     edges = 2 * np.pi * np.array(BANDS.edges[1:])
+    # Acceleration a has the power a² at every frequency of the band: its angle a² / w⁴; mean
+    # over the band of w^-4, w^-2 and 1.
     power = np.stack([np.diff(edges**-k) / -k / np.diff(edges) for k in (3, 1, -1)], axis=1)
     for b, (low, high) in enumerate(pairwise(BANDS.edges[1:])):
         sd = np.array([_unseen(name, f"{low:g} to {high:g} Hz") for name in names])
+        # Orthonormal cosines: variance sd² in a band of width h - l over the rate / 2 of all
+        # gives each coefficient so much.
         out[b + 1] = np.einsum("k,j,kjlm->lm", power[b], sd**2 * BANDS.rate / (2 * (high - low)), each)
     return out
 
@@ -130,6 +141,7 @@ def _unseen(joint: str, state: str) -> float:
 def _power() -> Array:
     """Return (B, 3): mean over each band of the powers 0, 2 and 4 of the angular frequency."""
     edges = 2 * np.pi * np.array(BANDS.edges)
+    # Mean of w^0, w², w⁴ over a band: difference of w^k / k at its edges over its width.
     return np.stack([np.diff(edges**k) / k / np.diff(edges) for k in (1, 3, 5)], axis=1)
 
 
@@ -139,11 +151,14 @@ def _felt(body: Body, q: Array, about: Array) -> tuple[Array, Array]:
     """
     pose, turn = poses(body, q[None]), np.eye(body.nv)
     if body.n_root:
+        # Pinocchio's root velocities are in the root's axes; the tangent here is in lab axes: R' brings them there.
         to_root = quaternion_matrix(q[None, 3:7])[0].T
         turn[:3, :3], turn[3:6, 3:6] = to_root, to_root
+    # First row: no acceleration (the weight alone); then one unit of each coordinate.
     rows = np.vstack([np.zeros(body.nv), np.eye(body.nv)]) @ turn.T
     still = Motion(np.arange(len(rows)) / 100.0, np.tile(q, (len(rows), 1)), np.zeros_like(rows), rows)
     value = predict_wrench(body, still).value
+    # Linear in accelerations at rest: less the weight, column i is the wrench per unit acceleration of i.
     return _hung(body, pose), Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
 
 
@@ -151,6 +166,7 @@ def _powers(hung: Array, moved: Array) -> Array:
     """Return (3, n, 6, 6): covariance per power 0, 2 and 4 of the angular frequency of n errors, of which (n, 6, k) are
     ``hung`` and ``moved`` per unit (`_felt`).
     """
+    # Wrench H x + M x'', with x'' = -w² x: H H' - w² (H M' + M H') + w⁴ M M'.
     both = hung @ moved.swapaxes(1, 2)
     return np.stack([hung @ hung.swapaxes(1, 2), -(both + both.swapaxes(1, 2)), moved @ moved.swapaxes(1, 2)])
 
@@ -159,7 +175,9 @@ def _hung(body: Body, pose: Poses) -> Array:
     """Return (6, nv): what displacing the tangent of a posture adds to the wrench because every segment has weight."""
     every = list(range(len(body.segments)))
     centres = place_jacobian(body, pose, every, pose.points(every, body.sip.com))[0].reshape(len(every), 3, -1)
+    # A displacement u moves the weight: moment u x (-m g) of what the ground must carry.
     lifted = np.cross(centres, -body.gravity, axisa=1, axisc=1)
+    # Sum over segments s of m_s (u_s x -g); no force, as weight stays the same.
     return np.concatenate([np.zeros((3, centres.shape[2])), np.einsum("s,sij->ij", body.sip.mass, lifted)])
 
 
@@ -169,6 +187,7 @@ def of_marker_errors(body: Body, postures: Array, about: Array, power: Array) ->
     mean over the ``postures`` (n, nq).
     """
     each = power.reshape(*power.shape[:2], -1) * np.ones(len(body.markers.names))
+    # sum over powers k and markers m of power[b, k, m] covariance[k, m, i, j].
     return np.einsum("bkm,kmij->bij", each, np.mean([carried(body, q, about) for q in postures], axis=0))
 
 
@@ -176,6 +195,7 @@ def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate:
     """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
     the wrench residual, mean over the ``postures`` (n, nq).
     """
+    # Noise white up to rate / 2 keeps BANDS.rate / rate of its power below half of BANDS.rate.
     return of_marker_errors(body, postures, about, noise**2 * min(1.0, BANDS.rate / rate) * _power())
 
 
@@ -183,6 +203,7 @@ def of_plates(density: Array, count: int) -> Array:
     """Return (6, 6): covariance of one coefficient from the noise of ``count`` plates of ``density`` (6,) N, N·m per
     root Hz each.
     """
+    # Density² times half the rate: variance of each coefficient of white noise (orthonormal cosines).
     return np.diag(count * density**2 * BANDS.rate / 2)
 
 
@@ -193,6 +214,7 @@ def of_zeros(seconds: Sequence[float]) -> Array:
     out = np.zeros((len(BANDS), 6, 6))
     sd = np.repeat([error_size("plate_zero", "force"), error_size("plate_zero", "moment")], 3)
     if len(seconds):
+        # A constant z over n samples has the first coefficient sqrt(n) z: variance n sd², n = seconds times rate.
         out[0] = float(np.mean(seconds)) * BANDS.rate * np.diag(sd**2)
     return out
 
@@ -214,6 +236,7 @@ def added_noise(
     out = np.tile(of_plates(density, count), (len(BANDS), 1, 1))
     if beyond > 0:
         rate = float(np.median([one.rate for one in markers]))
+        # Only the camera noise beyond that of the sessions that the tolerances were learned on.
         out += _COHERENT * of_cameras(body, postures, about, noise=float(beyond), rate=rate)
     return np.asarray(out)
 
@@ -239,6 +262,7 @@ def with_movement(known: Tolerances, needed: Array) -> Tolerances:
     level = ratio[0, [CHANNELS.index(name) for name in ("Fx", "Fy", "Mz")]]
     more = np.sqrt(np.maximum(1.0, np.append(level.mean(), ratio[1:].mean(axis=1))))[:, None] * np.ones(len(CHANNELS))
     more[0, CHANNELS.index("Fz")] = 1.0
+    # D N D with D = diag(more): every channel's standard deviation grows, correlations stay.
     return replace(known, noise=known.noise * more[:, :, None] * more[:, None, :])
 
 
@@ -251,4 +275,5 @@ def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
 
 def _relative(mass: float) -> float:
     """Return what a covariance of a person of ``mass`` kg is multiplied by for the `REFERENCE_PERSON`."""
+    # Noise is learned per person of the reference mass: covariances scale with the square of the mass.
     return (REFERENCE_PERSON / mass) ** 2

@@ -92,6 +92,7 @@ def _excess(power: Array, usual: tuple[float, ...]) -> Array:
     (B,) m.
     """
     middle = _middle(power)
+    # Share of the power beyond the usual: 1 - usual² / measured², as independent parts add in power.
     share = np.maximum(1 - np.square(usual) / np.maximum(middle[:, 0], 1e-12), 0.0)
     return np.asarray(share[:, None, None] * np.minimum(power, _LOUDEST * middle[:, :, None]))
 
@@ -109,13 +110,16 @@ def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> I
     local, specific = np.full(shape, np.nan), np.zeros(shape)
     turn = pose.rotation[:, segment]
     apart = markers.select(body.markers.names[k] for k in worn).xyz[::step] - place
+    # R' (measured - model): sum over i of R[t, k, i, j] d[t, k, i].
     local[:, worn] = np.einsum("tkij,tki->tkj", turn, apart)
     if len(q) > 2:
         acceleration = np.gradient(np.gradient(place, 1 / rate, axis=0), 1 / rate, axis=0)
+        # Specific force g - a in the segment's axes: what flesh is pulled by.
         specific[:, worn] = np.einsum("tkij,tki->tkj", turn, GRAVITY - acceleration)
     angles = np.column_stack([np.ones(len(q)), q[:, 7 if body.n_root else 0 :]])
     bands = BANDS.at(rate)
     for pick in bands.runs(use[::step], rate):
+        # As in `Bands.of`: k half periods in the run.
         frequency = np.arange(pick.size) * bands.rate / (2 * pick.size)
         kept = bands.of(pick.size) >= 0
         cut = [bands.coefficients(one[pick])[kept] for one in (angles, local, specific)]
@@ -132,16 +136,21 @@ def _left(every: _Runs, marker: int) -> Array:
     angles, specific, place = every.angles[seen], every.specific[seen, marker], every.local[seen, marker]
     speed = 2 * np.pi * every.frequency[seen]
     band = np.searchsorted(BANDS.edges, every.frequency[seen], side="right") - 1
+    # Columns that never move are left out: QR of a zero column would still give it a direction.
     basis = np.linalg.qr(angles[:, angles.any(axis=0)])[0]
+    # Q Q' projects on the angles; what is left of place and specific force is orthogonal to them (Frisch-Waugh).
     rest, beside = (one - basis @ (basis.T @ one) for one in (place, specific))
     told = np.linalg.norm(beside, axis=0) > _EXPLAINED * np.linalg.norm(specific, axis=0)
     slow, beside = band < len(BANDS) - 1, beside[:, told]
+    # Fitted in slow bands alone, applied in all: in the fastest, cameras would look like lag.
     swing = beside @ np.linalg.lstsq(beside[slow], rest[slow], rcond=None)[0]
+    # 1 - leverage: how many coefficients of a band the angles leave (its sum is n - p over all).
     free = 1 - np.sum(basis**2, axis=1)
     for b in range(len(BANDS)):
         here = band == b
         if free[here].sum() >= _FEWEST:
             for which, (one, count) in enumerate(((rest - swing, free[here].sum()), (swing, here.sum()))):
                 square = np.mean(one[here] ** 2, axis=1)
+                # Powers of the angular frequency: displacement, and what it becomes in velocity and acceleration.
                 out[which, b] = [np.sum(square * speed[here] ** power) / count for power in (0, 2, 4)]
     return out

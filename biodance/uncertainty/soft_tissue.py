@@ -29,6 +29,7 @@ class _WithAngles(ErrorSource):
 
     def functional(self, trial: Response) -> Array:
         """Return the functionals, times the angles."""
+        # Slope (F, 9, P) times angle (F, n) as (F, 9, P, n), the angles last.
         parts = [value[..., None] * self._angles(trial)[:, None, None, near] for value, near in self._slopes(trial)]
         return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
 
@@ -71,12 +72,15 @@ class Slide(_WithAngles):
         """Return the squared residuals of every pattern, times the squared angles."""
         count = len(self.body.markers.names) * len(trial.place)
         parts = ((np.einsum("frp,frp->fp", left, left), near) for left, near in self._left(trial))
+        # |left|² of a pattern times angle² summed over frames, over M F: mean squared distance.
         return np.concatenate([(square.T @ trial.turned[:, near] ** 2 / count).ravel() for square, near in parts])
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
             if self._alone[s]:
                 answer = trial.answer[:, :, rows].reshape(len(trial.answer), -1, 3)
+                # Each marker alone has the axes of its segment as patterns: displacements are
+                # -R, no (3m, 3m) is formed.
                 yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 9, -1), near
             else:
                 yield trial.of_markers(self._moved(trial, s, on), rows), near
@@ -98,6 +102,7 @@ class Slide(_WithAngles):
     def _moved(self, trial: Response, s: int, on: Index) -> Array:
         """Return the displacements (F, 3m, P) of the model's markers against those measured, lab."""
         local = np.swapaxes(self.patterns[s], 1, 2)[None]
+        # The skin carries the measured marker by +p: the model's lies -p from it.
         moved = -np.swapaxes(local @ np.swapaxes(trial.pose.rotation[:, s, None], -1, -2), -1, -2)
         return np.asarray(moved).reshape(len(moved), 3 * on.size, -1)
 
@@ -155,9 +160,12 @@ class Sag(ErrorSource):
         """
         on = np.flatnonzero(np.array(self.body.markers.segment) == s)
         move = trial.segments
+        # Middle of the markers: its acceleration is that of the origin + dw x r + w x (w x r).
         arm = move.rotation[:, s] @ self.body.markers.position[on].mean(axis=0)
         w = move.angular_velocity[:, s]
         acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
+        # a - g, less the same at rest where the marker was placed, carried along by the segment: that is in its place.
+        # Where the segment stands as it did there, nothing is left.
         carried = move.rotation[:, s] @ (self._placed[s].T @ -self.body.gravity)
         left_behind = np.tile(acceleration - self.body.gravity - carried, (1, on.size))[:, :, None]
         return left_behind, (3 * on[:, None] + np.arange(3)).ravel()
@@ -181,6 +189,7 @@ class Flesh(_WithAngles):
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, near in enumerate(self._beside):
+            # Functionals of a displacement (lab) times R: per metre along the segment's axes.
             yield trial.place[:, s] @ trial.pose.rotation[:, s], near
 
     def _angles(self, trial: Response) -> Array:

@@ -66,6 +66,7 @@ def of_clusters(body: Body) -> tuple[ErrorSource, ...]:
 def of_markers(body: Body) -> tuple[Slide, Flesh, Centre, Tilt]:
     """Return the errors with every marker sliding by itself: what identification discounts."""
     worn = [np.sum(np.array(body.markers.segment) == s) for s in range(len(body.segments))]
+    # Pattern 3k + i moves marker k along axis i.
     alone = tuple(np.eye(3 * count).reshape(count, 3, 3 * count) for count in worn)
     return (Slide(body, alone), Flesh(body), Centre(body), Tilt(body))
 
@@ -116,6 +117,7 @@ def _patterns(body: Body) -> tuple[Array, ...]:
     for s in range(len(body.segments)):
         places = body.markers.position[worn == s]
         middle = places - places.mean(axis=0) if len(places) else places
+        # Turn about the markers' middle, in metres at `CLUSTER_REACH`, so that patterns have one unit.
         turns = [np.cross(axis, middle) / CLUSTER_REACH for axis in np.eye(3)]
         kept = [np.tile(axis, (len(places), 1)) for axis in np.eye(3)] + [
             turn for turn in turns if np.abs(turn).max(initial=0) > 1e-6

@@ -115,6 +115,7 @@ class Tolerances:
 
     def whiteners(self, mass: float) -> Array:
         """Return (B, 6, 6) matrices that whiten a coefficient of a person of ``mass`` kg."""
+        # L^-1 of S = L L'; S grows with mass², so L^-1 shrinks with mass.
         return np.linalg.inv(np.linalg.cholesky(self.noise)) * (REFERENCE_PERSON / mass)
 
 
@@ -141,12 +142,14 @@ def without_habits(found: Tolerances) -> Tolerances:
     for key, mean in found.means.items():
         if not key.startswith(_PHYSICS):
             effect, *target = key.split()[:-1]
+            # The last word is the parameter: effect and target make the key of the size.
             habits.setdefault(key_of(effect, " ".join(target)), []).append(mean)
     wider = {}
     for key, means in habits.items():
         shown = found.size(f"shown {key}") > 0
         if found.size(key) > 0:
             own = 0.0 if shown else found.size(key)
+            # Root mean square about zero: a mean that may be otherwise elsewhere counts as spread.
             wider[HABIT + key if shown else key] = float(np.sqrt(own**2 + np.mean(np.square(means))))
     physics = {key: mean for key, mean in found.means.items() if key.startswith(_PHYSICS)}
     return replace(found, sizes={**found.sizes, **wider}, means=physics)
@@ -277,11 +280,13 @@ def whitened(
     count = 6 * band.size
     out = np.empty(rows.shape, rows.dtype) if out is None else out
     wrench, white = (some[:count].reshape(band.size, 6, math.prod(rows.shape[1:])) for some in (rows, out))
+    # One matrix per band, applied to (n, 6, columns) at once.
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
         here = np.flatnonzero(band == b)
         for some in (here[start : start + _PIECE] for start in range(0, here.size, _PIECE)):
             white[some] = matrix @ wrench[some]
     known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
+    # A marker without a known size has infinite variance: its rows become zero and tell nothing.
     sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
     out[count:] = rows[count:] / sd[:, None]
     return out

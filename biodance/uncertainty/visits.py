@@ -41,6 +41,7 @@ class VisitMean:
         """
         if self.count < FEWEST_STRIDES:
             return None
+        # Two-sided: 97.5 % quantile of Student's t.
         half = float(student.ppf((1 + _COVERAGE) / 2, self.freedom)) * self.error
         return self.mean - half, self.mean + half
 
@@ -79,6 +80,7 @@ def change_of_mean(earlier: VisitMean, later: VisitMean) -> MeanChange:
     variance = sum(one.error**2 + one.systematic**2 for one in both)
     if variance <= 0:
         return MeanChange(value, (value, value), 1.0 if value == 0 else 0.0)
+    # Welch-Satterthwaite: only errors that were estimated from strides have degrees of freedom.
     scatter = sum(one.error**4 / one.freedom for one in both)
     freedom = variance**2 / scatter if scatter > 0 else float("inf")
     sd = float(np.sqrt(variance))
@@ -163,6 +165,7 @@ def placement_sd(of: KeyKind) -> float:
         return _of_angle(of)
     if of.unit in ("N·m/kg", "W/kg"):
         joint = of.quantity.partition("_")[0]
+        # m g d for 1 kg; a power is this moment times the joint's rate.
         return _G * placement_sizes()[joint] * (of.rate if of.unit == "W/kg" else 1.0)
     marker, two = placement_sizes()["marker"], float(np.sqrt(2))
     sizes = {
@@ -175,6 +178,7 @@ def placement_sd(of: KeyKind) -> float:
         "step_time": _EVENT,
         "contact_time": _EVENT,
         "flight_time": _EVENT,
+        # An error of time in % of the stride: 100 dt over the stride time (`rate` = 1 / stride time).
         "stance": 100 * _EVENT * of.rate,
         "double_support": 100 * two * _EVENT * of.rate,
         "ground_reaction_forward": placement_sizes()["frame"] * _INWARD,
@@ -188,9 +192,11 @@ def _of_angle(of: KeyKind) -> float:
     turn = size["frame"] * float(np.sqrt(1 if joint in ("pelvis", "foot") else 2))
     parts = [turn * of.beside]
     if joint in _LEVER:
+        # Chord of the circle on which the wrong centre travels while the joint goes through its range.
         drift = 2 * np.sin(np.radians(of.span) / 2) * size[joint]
         parts.append(float(np.degrees(drift / _LEVER[joint])))
     if joint in _SKIN:
+        # Skin at four independent markers: their mean over lever has half the size of one.
         parts.append(float(np.degrees(size["skin"] * _LIMB_TURNS / (2 * _SKIN[joint]))))
     if of.key != "range":
         parts.append(float(np.degrees(turn)))

@@ -97,6 +97,7 @@ def body_weight_support(performance: Performance, time: Array, target: str, forc
         return np.zeros((time.size, 6))
     point = grip("pelvis", true_poses(performance, time))
     away, length = _rope(performance, point)
+    # Taut only: a rope does not push.
     tension = np.maximum(force + stiffness * (length - length[0]), 0.0)
     return force_at_point((tension / length)[:, None] * away, point)
 
@@ -126,6 +127,7 @@ def table_edge(performance: Performance, time: Array, target: str, force: float)
 def spinning_wheel(performance: Performance, time: Array, target: str, momentum: float) -> Array:
     """Carry a spinning wheel about the right-left axis of the chest: its ``momentum`` (N·m·s) resists turning."""
     turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
+    # The chest gives dL/dt to the wheel, the wheel its negative to the chest.
     return np.concatenate([np.zeros((time.size, 3)), -np.gradient(momentum * turn[:, :, 2], time, axis=0)], axis=1)
 
 
@@ -152,10 +154,12 @@ def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Arra
     from scipy.signal import cont2discrete, lfilter, ss2tf
 
     w, damping = 2 * np.pi * spring.frequency, spring.damping
+    # z'' = -w² z - 2 d w z' - a in the frame of the foot.
     A, B = np.array([[0.0, 1.0], [-w * w, -2 * damping * w]]), np.array([[0.0], [-1.0]])
     discrete = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), step, method="foh")
     numerator, denominator = ss2tf(*discrete[:4])
     z, rate = (lfilter(row, denominator, acceleration, axis=0) for row in numerator)
+    # z'' from the equation itself, not by differences.
     return z, -w * w * z - 2 * damping * w * rate - acceleration
 
 
@@ -168,9 +172,11 @@ def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedFor
         point = true_poses(performance, time).points([TRUE_SEGMENTS.index(segment)], place[None])[:, 0]
         acceleration = make_interp_spline(time, point, k=5).derivative(2)(time)
         z, z2 = (np.array(spring.free) * curve for curve in swing(acceleration, float(time[1] - time[0]), spring))
+        # Moment of the mass where it is, with its own acceleration, less that of the mass as it is counted.
         moment = np.cross(point + z, mass * (acceleration + z2 - GRAVITY)) - np.cross(
             point, mass * (acceleration - GRAVITY)
         )
+        # On the person, hence the minus.
         return -np.concatenate([mass * z2, moment], axis=1)
 
     return act
@@ -365,6 +371,7 @@ def conceal(cause: Hidden, scene: Scene) -> Scene:
         raise UnknownName.of("effect that the virtual laboratory can make", cause.name, CAUSES)
     ends = np.cumsum([trial.duration for trial in scene.protocol.trials])
     starts = ends - [trial.duration for trial in scene.protocol.trials]
+    # Share of the session's time.
     clock = {
         trial.name: (float(start / ends[-1]), float(end / ends[-1]))
         for trial, start, end in zip(scene.protocol.trials, starts, ends, strict=True)

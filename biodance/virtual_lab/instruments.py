@@ -68,12 +68,15 @@ def draw_soft_tissue(
             pulls |= SHOULDER_PULL
         for joint, millimetres in pulls.items():
             full = joint if joint in joints else f"{side}_{joint}"
+            # Three independent components: the length of the vector has the given root mean square.
             scale[joints.index(full), k] = 0.001 * millimetres / np.sqrt(3.0)
         swing[k] = 2 * np.pi * SWING.get(name[1:], BONY)
     own, day = skeleton.stream(person.seed, "soft tissue"), skeleton.stream(person.seed, "soft tissue", str(session))
     share = tolerances.soft_tissue_day
     shape = (*scale.shape, 3)
+    # Shares of the variance, so roots of the amplitudes; the variance stays one.
     direction = np.sqrt(1 - share) * own.normal(size=shape) + np.sqrt(share) * day.normal(size=shape)
+    # Lognormal about one.
     soft = np.exp(
         0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size))
     )
@@ -87,6 +90,7 @@ def draw_soft_tissue(
         ]
     )
     pull = pulled * tolerances.soft_tissue * scale[..., None] * direction
+    # Static displacement of a spring: specific force over w².
     return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
 
 
@@ -116,11 +120,14 @@ def skin_displacement(
     """
     markers: SegmentMarkers = person.body.markers
     turn = poses.rotation[:, list(markers.segment)]
+    # Sum over joints of angle times pull: linear in the angles.
     local = np.einsum("tj,jki->tki", angles - reference_angles(person), tissue.pull)
     if tissue.wave[0].any():
         size, frequency, phase = tissue.wave
         local += size * np.sin(frequency * time[:, None, None] + phase)
+    # R'(g - a): what a spring on the bone feels.
     specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
+    # Less what it felt upright when the markers were glued: gravity along -y of every segment.
     local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
     if np.any(tissue.sag):
         drift = skeleton.smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
@@ -141,6 +148,7 @@ def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng:
     pose = poses(person.body, motion.q)
     markers = person.body.markers
     bone = pose.points(markers.segment, np.array(markers.position))
+    # Quintic: its second derivative is smooth, too.
     acceleration = make_interp_spline(time, bone, k=5).derivative(2)(time)
     return bone + skin_displacement(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)
 
@@ -163,6 +171,7 @@ def film(
     xyz = xyz + tolerances.camera_wander * wander + tolerances.camera_noise * rng.normal(size=xyz.shape)
     if performance.plan.role != "static":
         step = time[1] - time[0]
+        # Poisson: independent gaps, so many a minute in the mean.
         for _ in range(rng.poisson(tolerances.gaps_per_minute * (time[-1] - time[0]) / 60.0)):
             first, marker = int(rng.integers(0, time.size)), int(rng.integers(0, xyz.shape[1]))
             xyz[first : first + int(rng.uniform(SHORTEST_GAP, LONGEST_GAP) / step), marker] = np.nan
@@ -224,14 +233,17 @@ def lay_plate(
     little elsewhere; ``moment_zero`` N·m, standard deviation of its moments' zeros beyond that of its forces; ``half``
     (2,) m, half its sides across and along.
     """
+    # Full scales say what is large in each channel: noise and zeros in proportion to that of Fz.
     t, relative = tolerances, FULL_SCALE / FULL_SCALE[2]
     forward, leftward = (
         np.array([np.cos(heading), np.sin(heading), 0.0]),
         np.array([-np.sin(heading), np.cos(heading), 0.0]),
     )
+    # Columns: x to the left, y ahead, z down, which is right-handed.
     turn = np.stack([leftward, forward, np.array([0.0, 0.0, -1.0])], axis=1)
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
     corners = centre + (signs * half) @ turn[:, :2].T
+    # A share of one channel's full scale shows as the same share of another one's.
     mixing = t.plate_crosstalk * rng.normal(size=(6, 6)) * np.outer(FULL_SCALE, 1 / FULL_SCALE)
     np.fill_diagonal(mixing, 1.0 + t.plate_gain * rng.normal(size=6))
     true_turn = turn @ skeleton.small_rotation(t.plate_rotation * rng.normal(size=3))
@@ -254,6 +266,7 @@ def sense_plate(
 
     ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
     """
+    # What is stored at t happened earlier.
     late = time - tolerances.plate_delay
     if plate.side == "none":
         value = np.zeros((time.size, 6))
@@ -261,8 +274,10 @@ def sense_plate(
         both = plate.side == "both"
         value = performance.wrench(late).value if both else performance.foot_wrench(late, plate.side)
     force, moment = value[:, :3] @ tilt.T, value[:, 3:] @ tilt.T
+    # M_c = M - c x F, then both into plate axes: v @ R is R'v.
     at_centre = moment - np.cross(plate.centre, force)
     force, moment = force @ plate.turn, at_centre @ plate.turn
+    # M_o = M_c + r x F, r from the sensor's origin to the centre.
     true = np.concatenate([force, moment + np.cross(ORIGIN, force)], axis=1)
     noise = tolerances.plate_noise * FULL_SCALE / FULL_SCALE[2] * rng.normal(size=true.shape)
     return true @ plate.mixing.T + plate.offset + noise
@@ -274,6 +289,7 @@ def digitise(channels: Array, plate: TruePlate, *, kind: int, bits: int) -> Plat
     """
     calibration = CALIBRATION if kind == 4 else np.diag(FULL_SCALE / 10.0)
     step = 20.0 / 2**bits
+    # C^-1 turns loads into volts; these are rounded to steps and cut at 10 V.
     volts = np.clip(np.round(channels @ np.linalg.inv(calibration).T / step) * step, -10.0, 10.0)
     if kind == 4:
         return PlateRecording(4, plate.corners, ORIGIN, volts, calibration=calibration)

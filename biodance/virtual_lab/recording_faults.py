@@ -36,14 +36,17 @@ class Channel:
 def decoding(plate: PlateRecording) -> Array:
     """Return D (6, 6): wrench on the subject about the plate's centre in lab axes = D @ channels, for TYPE 2 and 4."""
     first, second, _, fourth = plate.corners
+    # From corners 2 and 4 to 1: plate x and y.
     x = (first - second) / np.linalg.norm(first - second)
     z = np.cross(x, first - fourth)
     z /= np.linalg.norm(z)
     turn = np.stack([x, np.cross(z, x), z], axis=1)
     ox, oy, oz = plate.origin
     to_surface = np.eye(6)
+    # M_surface = M - origin x F.
     to_surface[3:, :3] = -np.array([[0, -oz, oy], [oz, 0, -ox], [-oy, ox, 0]])
     loads = np.eye(6) if plate.calibration is None else plate.calibration
+    # Block diagonal: force and moment turn alike.
     return np.kron(np.eye(2), turn) @ to_surface @ loads
 
 
@@ -106,6 +109,7 @@ def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Faul
     def fault(recording: Recording) -> Recording:
         plate = recording.plates[_plate_index(target, recording)]
         D = decoding(plate)
+        # The wrench, changed, and back to what is stored.
         channels = change(plate.channels @ D.T, recording) @ np.linalg.inv(D).T
         return _with_plate(target, recording, replace(plate, channels=channels))
 
@@ -159,6 +163,7 @@ def plate_crosstalk(wrench: Array, target: str, ratio: float) -> Array:
 @on_channel
 def plate_drift(channel: Channel, drift: float, clock: Clock) -> Array:
     """Let the zero wander by ``drift`` over the session."""
+    # Zero in the middle of the session.
     return channel.load + drift * (np.linspace(*clock[channel.trial], len(channel.load)) - 0.5)
 
 
@@ -187,6 +192,7 @@ _SLACK = (10.0, 20.0, 40.0)  # N, half widths of the plays in the plate's joints
 def plate_hysteresis(channel: Channel, width: float) -> Array:
     """Follow the load in a loop of half ``width`` (N or N·m): part of it passes through joints with play."""
     load, slacks = channel.load, np.array(_SLACK) * (1.0 if channel.force else 0.33)
+    # What is missing behind joints with play, as a share of the play; the mean of several makes a rounded loop.
     return load + width * np.mean([(_play(load, slack) - load) / slack for slack in slacks], axis=0)
 
 
@@ -195,6 +201,7 @@ def _play(load: Array, slack: float) -> Array:
     out = np.empty_like(load)
     place = load[0]
     for k, value in enumerate(load):
+        # Within the play nothing moves.
         place = min(max(place, value - slack), value + slack)
         out[k] = place
     return out
@@ -206,6 +213,7 @@ def plate_creep(channel: Channel, ratio: float) -> Array:
     from scipy.signal import lfilter
 
     step = 1.0 / (4.0 * channel.rate)
+    # First-order lag: y_k = y_(k-1) + step (x_k - y_(k-1)).
     return channel.load + ratio * lfilter([step], [1.0, step - 1.0], channel.load)
 
 
@@ -234,6 +242,7 @@ def plate_bending(wrench: Array, target: str, size: float) -> Array:
     safe = np.where(np.abs(wrench[:, 2]) > 20.0, wrench[:, 2], np.inf)
     x, y = -wrench[:, 4] / safe, wrench[:, 3] / safe
     far = (x**2 + y**2) / HALF_SIZE[1] ** 2
+    # x = -My / Fz and y = Mx / Fz: the moments that move the pressure.
     out[:, 4] -= size * far * wrench[:, 2]
     out[:, 3] += 0.5 * size * far * wrench[:, 2]
     return out
@@ -245,6 +254,7 @@ def object_on_plate(wrench: Array, target: str, weight: float) -> Array:
     x, y = 0.7 * HALF_SIZE
     share = np.linspace(0.0, 1.0, len(wrench))
     on = ((share > 0.3) & (share < 0.7)).astype(float)
+    # Moment of a vertical force at (x, y): (y, -x, 0) times it.
     return wrench + on[:, None] * weight * np.array([0.0, 0.0, 1.0, y, -x, 0.0])
 
 
@@ -276,6 +286,7 @@ def _late(recording: Recording, delay: Array | float) -> Recording:
 
     def late(values: Array) -> Array:
         samples = np.arange(len(values)) / recording.analog_rate
+        # Late: the sample at t was that of t - delay.
         return np.stack([np.interp(samples - delay, samples, column) for column in values.T], axis=1)
 
     return _with_channels(recording, late)

@@ -67,6 +67,7 @@ def merged_sip(person: Person, body: Body) -> Sip:
         total = np.zeros((4, 4))
         for part in parts:
             part_turn, part_place = true[part]
+            # Second moments of all parts add in one frame.
             total += place_inertia(of_parameters(body.sip.of(part)), turn.T @ part_turn, turn.T @ (part_place - place))
         phi.append(parameters_of_inertia(total))
     flat = np.concatenate(phi)
@@ -207,6 +208,7 @@ def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array) ->
         own = np.array(
             [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
         )
+        # new_R_lab lab_R_own, and the own origin in the new frame.
         there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
         phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
     flat = np.concatenate(phi)

@@ -147,11 +147,13 @@ def draw_laboratory(seed: int) -> Laboratory:
 def _drawn_tolerances(rng: np.random.Generator, segments: int) -> LabTolerances:
     """Draw how far everything is from the ideal: each tolerance by itself, and all unrest of people together."""
     known = {one.name for one in fields(LabTolerances)}
+    # Lognormal: each by itself.
     times = {name: float(np.exp(_SPREAD * rng.normal())) for name in (*_INSTRUMENTS, *_PEOPLE)}
     times |= dict.fromkeys(_UNREST, float(np.clip(np.exp(_SPREAD * rng.normal()), 0.5, 2.5)))
     times |= {name: 0.0 for least, names in _ALONE.items() if segments < least for name in names}
     drawn = {name: factor * getattr(REALISTIC, name) for name, factor in times.items() if name in known}
     soft = REALISTIC.soft_tissue * float(np.clip(np.exp(_SPREAD * rng.normal()), 0.5, 2.0))
+    # Uniform in the logarithm.
     density = float(np.exp(rng.uniform(*np.log(PLATES))))
     return replace(
         REALISTIC,
@@ -160,6 +162,7 @@ def _drawn_tolerances(rng: np.random.Generator, segments: int) -> LabTolerances:
         camera_noise=float(np.exp(rng.uniform(*np.log(CAMERAS)))),
         camera_wander=float(np.exp(rng.uniform(*np.log([1.0e-4, 6.0e-4])))),
         gaps_per_minute=float(np.exp(rng.uniform(*np.log([0.2, 4.0])))),
+        # White noise of this density in the band up to half of 1000 Hz.
         plate_noise=density * float(np.sqrt(1000.0 / 2)),
         plate_delay=float(rng.uniform(0.0, 0.003)),
     )
@@ -263,6 +266,7 @@ def _draw(person: Person, visit: LabVisit, day: int) -> tuple[Array, tuple[TrueP
     """Return the cameras' level (3,) rad and the plates as they are drawn for one day."""
     laboratory, tolerances = visit.laboratory, visit.tolerances
     rng = stream(person.seed, "instruments", str(day))
+    # No turn about the vertical: cameras are levelled, the heading is free.
     tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0]) + np.array(visit.tilt)
     plates = tuple(
         lay_plate(place, laboratory.heading, side, tolerances, rng, moment_zero=laboratory.moment_zero, half=half)
@@ -275,6 +279,7 @@ def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:
     """Return of every plate whose foot it carries, its centre (3,) m and half its sides (2,) m."""
     middle = np.array([*laboratory.centre, 0.0])
     half = HALF_BELT if laboratory.belts else HALF_SIZE
+    # Half sides: neighbours touch.
     ahead = np.array([np.cos(laboratory.heading), np.sin(laboratory.heading), 0.0]) * half[1]
     leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * half[0]
     apart = laboratory.belts == 2 if laboratory.belts else laboratory.plates > 1

@@ -79,6 +79,7 @@ def _branch(body: Body, segment: int) -> Branch:
     index = body.segment_joint[segment]
     while index >= 0:
         joint = body.joints[index]
+        # Axis and a point on it in the child's frame at zero angles: R'a, -R'p.
         hinges.insert(0, _Hinge(index, rotation.T @ joint.axis, -rotation.T @ translation))
         rotation, translation = joint.rotation @ rotation, joint.translation + joint.rotation @ translation
         index = joint.parent

@@ -27,11 +27,13 @@ def text(body: Body, source: str) -> str:
         other = np.eye(3)[np.argmin(np.abs(joint.axis))]
         y = np.cross(other, joint.axis)
         y = y / np.linalg.norm(y)
+        # First column the joint's axis: biorbd turns about the segment's own x.
         turn = np.stack([joint.axis, y, np.cross(joint.axis, y)], axis=1)
         above = links[joint.parent] if joint.parent >= 0 else body.segments[0] if body.n_root else ""
         placed = [*([f"parent {above}"] if above else []), *_placed(joint.rotation @ turn, joint.translation)]
         limits = f"rangesQ {row([body.limits.lower[i], body.limits.upper[i]])}"
         lines += _segment(joint.name, [*placed, "rotations x", limits])
+        # Back by turn': the segment with mass has the axes of the body again.
         back = [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))]
         lines += _segment(links[i], [*back, *(_mass(body, joint.segment) if joint.segment >= 0 else ())])
     markers = body.markers

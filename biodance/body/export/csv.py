@@ -52,6 +52,7 @@ def _derived(phi: Array) -> Array:
 def _derived_sd(phi: Array, covariance: Array) -> Array:
     """Return (9,) standard deviations of the derived quantities, propagated by central differences."""
     step = 1e-6 * np.maximum(np.abs(phi), 1e-6)
+    # First order: diagonal of D C D' with the slopes D by central differences.
     slope = np.stack(
         [(_derived(phi + h) - _derived(phi - h)) / (2 * s) for h, s in zip(np.diag(step), step, strict=True)], axis=1
     )

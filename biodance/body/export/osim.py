@@ -147,6 +147,7 @@ def _axes(body: Body, branch: Branch) -> Array:
     axes = [hinge.axis for hinge in branch.hinges]
     while len(axes) < 3:
         spanned = np.array(axes).reshape(-1, 3)
+        # Projection on what the axes so far do not span; the direction that is left whole is the next axis.
         rest = np.eye(3) - spanned.T @ np.linalg.pinv(spanned.T)
         value, vector = np.linalg.eigh(rest @ rest.T)
         axes.append(vector[:, np.argmax(value)])
@@ -156,6 +157,7 @@ def _axes(body: Body, branch: Branch) -> Array:
 def _body_fixed_xyz(rotation: Array) -> Array:
     """Return (3,) rad with ``rotation = Rx Ry Rz``, the orientation of an OpenSim frame; z is zero at y = +-90 deg."""
     across = np.hypot(rotation[0, 0], rotation[0, 1])
+    # R = Rx Ry Rz: R02 = sin y, R12 = -sin x cos y, R01 = -cos y sin z.
     y = np.arctan2(rotation[0, 2], across)
     if across < 1e-9:
         return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), y, 0.0])

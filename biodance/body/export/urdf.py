@@ -20,6 +20,7 @@ SUFFIX = ".urdf"
 def roll_pitch_yaw(rotation: Array) -> Array:
     """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; at pitch = +-90 deg with yaw zero."""
     across = np.hypot(rotation[0, 0], rotation[1, 0])
+    # R = Rz Ry Rx: R20 = -sin pitch, R21 = cos pitch sin roll, R10 = cos pitch sin yaw.
     pitch = np.arctan2(-rotation[2, 0], across)
     if across < 1e-9:
         return np.array([np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])

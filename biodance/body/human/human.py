@@ -87,6 +87,7 @@ def _table_spread(kind: str) -> _Spread:
     return _Spread(
         float(np.hypot(_sd([np.array(one) / np.mean(one) for one in masses]), inner.mass)),
         np.hypot(_sd([[unit.com for unit in units] for units in people]), inner.com),
+        # Radii go with the square root of the moment: d(log radius) = d(log J) / 2.
         np.hypot(_sd([[0.5 * np.log(np.diag(one)) for one in some] for some in tensors]), inner.radii),
         _sd([[one[(0, 0, 1), (1, 2, 2)] for one in some] for some in tensors]),
     )
@@ -101,6 +102,7 @@ def _sd(groups: Iterable[Sequence[Array]]) -> Array:
     """Return the standard deviation about the mean of each of ``groups``, pooled."""
     each = [np.array(group) for group in groups]
     squares = sum(((one - one.mean(axis=0)) ** 2).sum(axis=0) for one in each)
+    # Pooled: squares of all groups over the sum of their degrees of freedom.
     return np.asarray(np.sqrt(squares / sum(len(one) - 1 for one in each)))
 
 
@@ -120,6 +122,7 @@ def _within(kind: str) -> _Spread:
     mass, mass_sd = np.array([regression(part, "mass", "", MAN) for part in parts]).T
     share = mass / mass.sum()
     length = reference_lengths("M")["trunk_head" if kind == "pelvis" else kind]
+    # The centres of the parts err independently, each counts with its share of the mass.
     com = np.linalg.norm(share * [regression(part, "com", "longitudinal", MAN)[1] for part in parts]) / length
     along = np.array([com, 0.0, 0.0]) if kind == "foot" else np.array([0.0, com, 0.0])
     names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else _AXES
@@ -129,6 +132,7 @@ def _within(kind: str) -> _Spread:
 
 def _radius_sd(part: str, axis: str) -> float:
     (moment, moment_sd), (mass, mass_sd) = regression(part, "inertia", axis, MAN), regression(part, "mass", "", MAN)
+    # var(log k²) = var(log J) - var(log m); the radius k has half of that standard deviation.
     return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))
 
 
@@ -157,6 +161,7 @@ def prior(
     if opinions:
         apart = wider * primitive_covariance(lumps, skeleton, (), least=least)
         lumps, covariance = _weigh(lumps, covariance, apart, opinions)
+    # J C J', J block diagonal: from mass, centre and inertia about it to the ten parameters.
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
@@ -173,12 +178,14 @@ def _weigh(
     noise = block_diag(*(one.noise for one in opinions))
     theta = np.concatenate([primitives_of(lump) for lump in lumps])
     total = theta[::10].sum()
+    # Gain with each segment's spread on its own: `apart` has no common way of the tables.
     gain = np.linalg.solve(apart[np.ix_(where, where)] + noise, apart[where]).T
     keep = np.eye(len(covariance))
     for row, column in zip(where, gain.T, strict=True):
         keep[:, row] -= column
     theta = theta + gain @ (np.concatenate([one.value for one in opinions]) - theta[where])
     theta[::10] *= total / theta[::10].sum()
+    # Joseph's form (1 - G H) C (1 - G H)' + G N G': right for any gain, also where it is not that of C.
     return tuple(lump_from(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
@@ -208,6 +215,7 @@ def _boys_widening() -> float:
     limbs = ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
     apart = np.array([boy[kind] / adult.segments[kind].mass - 1.0 for kind in limbs])
     spread = np.array([_table_spread(kind).mass for kind in limbs])
+    # Widening w with mean of (apart² + spread²) / (w spread)² = 1.
     return float(max(1.0, np.sqrt(np.mean((apart**2 + spread**2) / spread**2))))
 
 
@@ -269,6 +277,7 @@ def primitive_covariance(
     variance = np.concatenate([_primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
     floor = [least * lump.mass * (len(PARTS[kind_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
     variance[::10] = np.maximum(variance[::10], np.square(floor))
+    # What the disagreement of the tables explains is no error of a segment's own; at least the share `own_share`.
     own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
     together = np.eye(len(SEGMENTS))
     for i, segment in enumerate(SEGMENTS):
@@ -276,9 +285,11 @@ def primitive_covariance(
             left = SEGMENTS.index(segment.replace("right_", "left_"))
             together[i, left] = together[left, i] = error_size("left_right_correlation", "mass")
     scale = own * np.concatenate([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
+    # Own errors, right and left correlated (mirrored axes change signs), plus one direction for each other table.
     covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale) + ways.T @ ways
     total = np.tile(np.eye(10)[0], len(SEGMENTS))
     gain = covariance @ total
+    # Conditioned on the total mass, known to `scale`.
     return covariance - np.outer(gain, gain) / (total @ gain + error_size("scale", "mass") ** 2)
 
 
@@ -294,6 +305,7 @@ def _primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))
     tensor = [
+        # J_ii = r²: d J = 2 J d(log r).
         2 * own[i, i] * kind.radii[i]
         if i == j
         else np.hypot(
@@ -397,6 +409,7 @@ def assemble(
     usual, corners = reference(table, subject), "x_min y_min z_min x_max y_max z_max"
     rows = [row_numbers(read_table("human", "boxes").row(segment=kind_of(s)), corners) for s in SEGMENTS]
     boxes = np.array(rows).reshape(-1, 2, 3) * skeleton.stature
+    # The box ends at the vertex, counted from this person's trunk joint instead of the usual lumbar one.
     boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - _LUMBAR_HEIGHT * skeleton.stature
     opinions = body_opinions(usual, skeleton, subject)
     sip = prior(usual, skeleton, subject, opinions)

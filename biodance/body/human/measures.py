@@ -97,9 +97,11 @@ def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Ar
         ends = np.array([points[label] for label in marker.corner_of])
         middle = ends.mean(axis=0)
         square = np.cross(ends[1] - ends[0], ends[2] - ends[0])
+        # Three equal arms at right angles: their ends lie R = sqrt(2/3) arm from their middle, the corner R / sqrt(2).
         reach = float(np.mean(np.linalg.norm(ends - middle, axis=1))) / np.sqrt(2.0)
         body = np.mean(list(points.values()), axis=0)
         step = reach * square / np.linalg.norm(square)
+        # The corner lies on the side of the body.
         found[marker.label] = middle + (step if step @ (body - middle) > 0 else -step)
     return found
 
@@ -131,6 +133,7 @@ def pelvis_frame(right_asis: Array, left_asis: Array, mid_psis: Array) -> tuple[
     middle = (right_asis + left_asis) / 2
     z = unit(right_asis - left_asis)
     y = unit(np.cross(z, middle - mid_psis))
+    # y square to z and to the sacral line: up; x = y x z forwards.
     return np.stack([np.cross(y, z), y, z], axis=1), middle
 
 
@@ -172,6 +175,7 @@ def chord(proximal: Array, marker: Array, distance: float, away_from: Array) -> 
     along = arm / reach
     side = unit(np.cross(np.cross(along, away_from - marker), along))
     cosine = min(distance / reach, 1.0)
+    # Right angle at the centre: at the marker cos = distance / reach.
     return np.asarray(marker + distance * (cosine * along - np.sqrt(1 - cosine**2) * side))
 
 

@@ -65,6 +65,7 @@ def stadium(girth: Array, aspect: Array) -> tuple[Array, Array]:
     """Return radius r and half length t (n,) m of stadia from their girths (n,) m and breadth over depth (n,), at
     least 1: girth = 2 pi r + 4 t, breadth over depth = (r + t) / r.
     """
+    # girth = 2 pi r + 4 t with t = (aspect - 1) r.
     radius = np.asarray(girth) / (2 * np.pi + 4 * (np.asarray(aspect) - 1))
     return radius, (np.asarray(aspect) - 1) * radius
 
@@ -91,15 +92,18 @@ def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -
     radius, half = stadium(girth, aspect)
     ends = np.unique(np.concatenate([[0.0], level, [1.0]]))
     low, step = ends[:-1, None], np.diff(ends)[:, None]
+    # Gauss-Legendre nodes of every interval between sections.
     place = (low + step * (1 + _NODES) / 2).ravel()
     weight = (step * _WEIGHTS / 2).ravel() * length
     r, t, y = np.interp(place, level, radius), np.interp(place, level, half), -place * length
     area = np.pi * r**2 + 4 * r * t
     volume = float(weight @ area)
     middle = float(weight @ (area * y)) / volume
+    # Second moments about the stadium's axes: circle, rectangle 2 t by 2 r, and half circles moved apart by t.
     xx = weight @ (np.pi * r**4 / 4 + 4 * t * r**3 / 3)
     zz = weight @ (np.pi * r**4 / 4 + 8 * t * r**3 / 3 + np.pi * r**2 * t**2 + 4 * r * t**3 / 3)
     yy = weight @ (area * (y - middle) ** 2)
+    # Second moments xx, yy, zz of volume: the inertia about x is yy + zz.
     return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
 
 
@@ -157,6 +161,7 @@ def _opinion(
     survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
     mean, mean_sd = _mean_fraction(kind, subject.sex)
     shape, survey_sd = (error_size("solid_mass", what) for what in ("trunk" if kind in _TRUNK else "limb", "survey"))
+    # Independent causes of error in quadrature: mean of the tables, shape of the solid, survey.
     own = np.linalg.norm([mean_sd, shape, survey_sd])
     mass = variance = 0.0
     said: tuple[str, ...] = ()
@@ -201,6 +206,7 @@ def _part_solid(
         return None
     level, aspect, usual = np.array([row_numbers(row, f"level aspect {subject.sex}") for row in rows]).T
     measured = np.array([girths[row["girth"]] or one for row, one in zip(rows, usual, strict=True)])
+    # A girth that was not measured grows by the mean ratio (of logarithms) of those that were.
     predict = np.where(given[:, None], np.eye(len(rows)), given / given.sum())
     girth = usual * np.exp(predict @ np.log(measured / usual))
     grown = table.provenance["people"]["stature_m"][subject.sex] / reference.stature
@@ -210,8 +216,10 @@ def _part_solid(
     volume = stadium_stack(level, girth, aspect, length=length).mass
     mean = stadium_stack(level, usual, aspect, length=usual_length).mass
     more = [girth * np.exp(_STEP * one) for one in np.eye(len(rows))]
+    # d log V / d log girth, by a step of one girth at a time.
     slope = np.array([np.log(stadium_stack(level, one, aspect, length=length).mass / volume) / _STEP for one in more])
     tape, untold = error_size("girth", "tape"), error_size("girth", "untold")
+    # Errors of the tape through the prediction; of what no tape told, its own.
     covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)
     said = tuple(row["girth"] for row, is_given in zip(rows, given, strict=True) if is_given)
     return _PartSolid(volume / mean, float(np.sqrt(slope @ covariance @ slope)), said)
@@ -241,6 +249,7 @@ def _foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, _SegmentOp
     opinions = {}
     for side in SIDES:
         area = _area(subject.foot_outline[side], subject.sex) / _area(usual, subject.sex)
+        # As the volume: area of the sole times height of the ankle, against those of the usual foot.
         mass = mean * people["mass_kg"][subject.sex] * area * skeleton.ankle_height[side] / height
         opinions[f"{side}_foot"] = _SegmentOpinion(mass, float(own * mass), ("foot outline",))
     return opinions
@@ -248,6 +257,7 @@ def _foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, _SegmentOp
 
 def _area(outline: FootSizes, sex: Sex) -> float:
     x, y = sole_corners(outline, sex).T
+    # Shoelace formula.
     return 0.5 * abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1)))
 
 
@@ -337,8 +347,10 @@ def _mass_noise(mass: Array, body: ScannedBody) -> Array:
     """Return the covariance (12, 12) kg² of the masses of a scan."""
     kinds = np.array([kind_of(name) for name in SEGMENTS])
     density = np.array([error_size("scan_density", "trunk" if kind in _TRUNK else "limb") for kind in kinds])
+    # Density errs alike for segments of one kind.
     noise = np.where(kinds[:, None] == kinds, np.outer(density * mass, density * mass), 0.0)
     surface = np.array([body.surfaces[name] for name in SEGMENTS])
+    # Surface farther out by one error everywhere: all masses gain together.
     noise += error_size("scan_surface", "any") ** 2 * np.outer(surface, surface)
     alike = error_size("left_right_correlation", "mass")
     for joint, neighbours in _NEIGHBOURS.items():
@@ -346,8 +358,10 @@ def _mass_noise(mass: Array, body: ScannedBody) -> Array:
         for row, side in zip(moved, SIDES, strict=True):
             near, far = (SEGMENTS.index(kind if kind in _TRUNK else f"{side}_{kind}") for kind in neighbours)
             row[near] = body.cuts[f"{side}_{joint}"]
+            # What one side of a cut gains the other loses.
             row[far] = -row[near]
         both = moved.sum(axis=0)
+        # Both sides' cuts correlated by `alike`: (1 - rho) each on its own, rho together.
         noise += error_size("scan_cut", joint) ** 2 * ((1 - alike) * moved.T @ moved + alike * np.outer(both, both))
     across = body.cuts["trunk"] * np.array([(name == "pelvis") - float(name == "trunk_head") for name in SEGMENTS])
     return np.asarray(noise + error_size("scan_cut", "trunk") ** 2 * np.outer(across, across))

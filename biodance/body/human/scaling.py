@@ -87,6 +87,7 @@ def _widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
     for segment, kind in sizes.items():
         k = body.segments.index(segment)
         moments = np.arange(10 * k + 1, 10 * k + 4)
+        # First moments only: mass unchanged, its place unsure by m times the standard deviation.
         covariance[moments, moments] += (body.sip.mass[k] * error_size("unseen_com", kind)) ** 2
     return replace(body, sip=replace(body.sip, covariance=covariance))
 
@@ -108,6 +109,7 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
         return [], []
     if len(absent) == 1 and "jugular_notch" in mark:
         seen = next(side for side in SIDES if side not in absent)
+        # Mirror image at the sagittal plane through the notch: the part along `right` turned round, twice.
         across = 2 * ((mark[f"{seen}_acromion"] - mark["jugular_notch"]) @ upright.right) * upright.right
         mark[f"{absent[0]}_acromion"] = mark[f"{seen}_acromion"] - across
         return [], [f"The {absent[0]} acromion has no marker: taken as the mirror image of the other."]
@@ -322,7 +324,9 @@ def _turn(frames: SegmentFrames, parent: str, child: str) -> Array:
     """Return the constant part of parent_R_child: a hinge's varus about x, an ankle's torsion about y."""
     relative = frames.rotation[parent].T @ frames.rotation[child]
     if kind_of(child) == "foot":
+        # Ry: R20 = -sin, R00 = cos.
         return elementary_rotation("y", np.arctan2(-relative[2, 0], relative[0, 0]))
+    # R = Rz(flexion) Rx(varus): R21 = sin(varus), whatever the flexion.
     return elementary_rotation("x", np.arcsin(relative[2, 1]))
 
 
@@ -348,6 +352,7 @@ def _static_posture(body: Body, frames: SegmentFrames) -> Array:
         chain = [i for i, joint in enumerate(body.joints) if joint.name.rsplit("_", 1)[0] == group]
         first, last = body.joints[chain[0]], body.joints[chain[-1]]
         above = body.segments[body.joints[first.parent].segment if first.parent >= 0 else 0]
+        # joint_R_child: from the parent's pose, the frame of the joint and the child's pose.
         relative = first.rotation.T @ frames.rotation[above].T @ frames.rotation[body.segments[last.segment]]
         q[7 + np.array(chain)] = chain_angles(relative, np.array([body.joints[i].axis for i in chain]))
     return q
@@ -360,12 +365,14 @@ def chain_angles(relative: Array, axes: Array) -> Array:
     One axis: any. Two: z then x. Three: z then x then y.
     """
     if len(axes) == 1:
+        # (R - R')/2 as a vector is sin(angle) times the axis, (trace - 1) / 2 its cosine.
         odd = (relative - relative.T) / 2
         return np.array([np.arctan2(axes[0] @ [odd[2, 1], odd[0, 2], odd[1, 0]], (np.trace(relative) - 1) / 2)])
     if len(axes) == 2:
         angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
     else:
         angles = [float(angle) for angle in zxy_angles(relative)]
+    # Signed axes: +1 or -1 along one coordinate each.
     return axes.sum(axis=1) * np.array(angles)
 
 
@@ -378,6 +385,7 @@ def tilted_joints(body: Body) -> tuple[str, ...]:
 
 def _tilt(rotation: Array) -> float:
     """Return the angle of a ``rotation`` (3, 3), deg."""
+    # trace = 1 + 2 cos.
     return float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0))))
 
 

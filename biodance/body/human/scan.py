@@ -47,12 +47,14 @@ def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
     above = height > 0
     count = above.sum(axis=1)
     edges = _crossing_edges(triangles, point, normal)
+    # Triangles by corners above the plane: 3 stay whole, 1 leaves a tip, 2 a quadrilateral (two triangles).
     whole, tips, roofs = (triangles[count == n] for n in (3, 1, 2))
     apex, roof = (_first(part, above[count == n] == (n == 1)) for part, n in ((tips, 1), (roofs, 2)))
     one, two = (edges[count[(count == 1) | (count == 2)] == n] for n in (1, 2))
     tip = np.stack([apex[:, 0], one[:, 1], one[:, 0]], axis=1)
     left = np.stack([roof[:, 1], roof[:, 2], two[:, 1]], axis=1)
     right = np.stack([roof[:, 1], two[:, 1], two[:, 0]], axis=1)
+    # A fan of triangles from `point` closes the cut: signed areas make any outline right.
     lid = np.stack([np.broadcast_to(point, (len(edges), 3)), edges[:, 0], edges[:, 1]], axis=1)
     return np.concatenate([whole, tip, left, right, lid])
 
@@ -65,6 +67,7 @@ def _crossing_edges(triangles: Array, point: Array, normal: Array) -> Array:
     triangles, height, single = triangles[crossed], height[crossed], count[crossed] == 1
     alone = (height > 0) == single[:, None]
     corner, level = _first(triangles, alone), _first(height[..., None], alone)[..., 0]
+    # Linear along the edge: zero of the height between its ends.
     share = (level[:, :1] / (level[:, :1] - level[:, 1:]))[..., None]
     ends = corner[:, :1] + share * (corner[:, 1:] - corner[:, :1])
     return np.asarray(np.where(single[:, None, None], ends[:, ::-1], ends))
@@ -76,8 +79,10 @@ def cut_section(triangles: Array, point: Array, normal: Array) -> _Section:
     An empty section has area 0 and its middle at ``point``.
     """
     arm = _crossing_edges(triangles, point, normal) - point
+    # Twice the signed area of each triangle of the fan, seen along the normal.
     twice = np.cross(arm[:, 0], arm[:, 1]) @ -normal
     area = float(twice.sum()) / 2
+    # Centroid of a triangle at a third of its corners' sum (one is the origin): area times / 3, twice / 6.
     first = (twice @ arm.sum(axis=1)) / 6 if len(arm) else np.zeros(3)
     return _Section(area, point + (first / area if area > 0 else 0.0))
 
@@ -182,6 +187,7 @@ def _turned(path: str, corners: Array, stature: float) -> _Scan:
     surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     flat = corners.mean(axis=1)[:, :2]
     away = flat - surface @ flat / surface.sum()
+    # Largest principal axis of the surface seen from above.
     wide = np.linalg.eigh((away * surface[:, None]).T @ away)[1][:, 1]
     deep = np.array([-wide[1], wide[0]])
     z = np.array([0.0, 0.0, 1.0])
@@ -283,6 +289,7 @@ def _hip(scan: _Scan, skeleton: Skeleton, side: str) -> tuple[Array, Array]:
     ankle = section.middle
     length = skeleton.lengths[f"{side}_thigh"] + skeleton.lengths[f"{side}_shank"]
     across = abs(skeleton.origins[f"{side}_hip"][2])
+    # Pythagoras in the frontal plane: leg length and the difference of the widths of ankle and hip.
     rise = np.sqrt(max(length**2 - (abs(ankle[2]) - across) ** 2, 0.5 * length**2))
     ahead = cut_section(scan.triangles, np.array([0.0, up + rise, 0.0]), _UP).middle[0]
     return ankle, np.array([ahead, up + rise, sign * across])
@@ -299,6 +306,7 @@ def _leg(
     cuts |= {f"{side}_knee": _slope(knee, "thigh"), f"{side}_ankle": _slope(low, "shank")}
     whole = _lump(foot, "foot", ankle, _UP)
     # the foot's long axis, about which it has least inertia, is turned about the vertical so that it points ahead
+    # Least eigenvalue of the horizontal inertia: the foot's long axis.
     spread = np.linalg.eigh(whole.inertia[np.ix_([0, 2], [0, 2])])[1][:, 0]
     c, s = spread * np.sign(spread[0] or 1.0)
     return {
@@ -328,6 +336,7 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     _refuse_arm(side, skeleton, float(np.linalg.norm(way)), angle)
     tilts = np.linspace(0.0, min(0.8 * angle, _STEEPEST), _TILTS)
     places = shoulder - sign * np.linspace(0, _INSIDE * skeleton.stature, _PLACES)[:, None] * [0.0, 0.0, 1.0]
+    # Normal between straight sideways and tilted up by at most the steepest plane.
     planes = [(place, np.array([0.0, np.sin(tilt), sign * np.cos(tilt)])) for place in places for tilt in tilts]
     above = scan.triangles[scan.triangles[..., 1].max(axis=1) > middle[1]]
     areas = [cut_section(above, *plane).area for plane in planes]
@@ -395,6 +404,7 @@ def _lump(part: Array, kind: str, origin: Array, up: Array) -> RigidInertia:
     y = up / np.linalg.norm(up)
     x = np.cross(y, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
+    # Rows are the axes: frame is own_R_scan.
     frame = np.stack([x, y, np.cross(x, y)])
     found = mass_properties(part - origin, density=_density(kind)) if len(part) else None
     if found is None or found.volume <= 0:

@@ -48,6 +48,7 @@ def side_of(segment: str) -> float:
 
 def upright_to(point: Array) -> Array:
     """Return the rotation (3, 3) about z that turns y towards a point (3,) in the sagittal plane."""
+    # y turned onto (sin, cos): a rotation about z by -atan2(x, y).
     sine, cosine = point[:2] / np.linalg.norm(point[:2])
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
@@ -112,6 +113,7 @@ def joint_tree(skeleton: Skeleton) -> tuple[Joint, ...]:
             Joint(
                 name=row["joint"],
                 parent=tip[row["parent"]] if first else i - 1,
+                # The axis is written in the child's frame, which is turned by the constant varus.
                 axis=turn.T @ axis if first and last else axis,
                 rotation=turn,
                 translation=skeleton.origins[group] if first else np.zeros(3),
@@ -225,6 +227,7 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     def named(*ends: str) -> Array:
         return np.array([name.endswith(ends) for name in names], dtype=float)
 
+    # A pelvis tilted forwards adds to hip flexion and takes from trunk flexion; ranges only grow.
     shift = tilt * (named("_hip_flexion") - named("trunk_flexion"))
     lower, upper = body.limits.lower + np.minimum(shift, 0.0), body.limits.upper + np.maximum(shift, 0.0)
     upper = np.where(named("_ankle_dorsiflexion"), np.maximum(upper, _LOADED_ANKLE), upper)
@@ -258,6 +261,7 @@ def standing_tilt(q: Array) -> float:
     """Return the forward tilt, rad, of the pelvis in a posture q: how far its x axis points below the horizontal."""
     from scipy.spatial.transform import Rotation
 
+    # R20 is the z component of the x axis: minus the sine of the tilt forwards.
     return -float(np.arcsin(Rotation.from_quat(q[3:7]).as_matrix()[2, 0]))
 
 
@@ -336,6 +340,7 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
     ]
     fraction, place, sagittal, transverse, along = np.mean(rows, axis=0)
     mass, length = fraction * float(body.sip.mass.sum()), float(np.linalg.norm(top - bottom))
+    # Radii of gyration of the table's sagittal, longitudinal and transverse axes about x, y, z.
     inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
     return inertial_parameters(RigidInertia(mass, top + place * (bottom - top), inertia))
 

@@ -64,6 +64,7 @@ class Centres:
     def sides_sd(self, limb: str) -> float:
         """Return the sd (m) of how much longer a ``limb`` is on the right: of people, and of joint centres."""
         ends = (self.sd(f"{side}_{joint}") for side in SIGN for joint in LIMB_ENDS[limb])
+        # Differences of lengths: people, and the four ends' centres, independent.
         return float(np.linalg.norm([error_size("side_length", "limb"), *ends]))
 
 
@@ -133,6 +134,7 @@ def _shoulder_centres(place: _Places, sizes: measures.Measures, mid_hip: Array) 
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
         up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
         ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
+        # Part of ahead across up.
         forward = measures.unit(np.cross(np.cross(up, ahead), up))
     else:
         up = (right + left) / 2 - mid_hip
@@ -169,6 +171,7 @@ def knee_centre(
         return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
     centre = measures.chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
     axis = SIGN[side] * (lateral - centre)
+    # Signed angle about the vertical between the horizontal parts of both axes.
     angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
     if abs(angle) <= _AXIS_TOLERANCE:
         return centre, ""
@@ -273,5 +276,6 @@ def _chain(
     (upper, lower), (top, middle, end) = names, centres
     rotation[upper], origin[upper], origin[lower] = _frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ measures.unit(middle - end)
+    # y of the lower segment: Rz(f) Rx(v) e_y = (-sin f cos v, cos f cos v, sin v).
     flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
     rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)

@@ -158,6 +158,7 @@ def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
     table, length = _shipped("dumas_2018"), _dumas_length(segment, sex)
     mass = table.value(segment, "mass", sex=sex)
     com = np.array(table.values(segment, "com", "x y z", sex=sex)) * length + [0.0, origin, 0.0]
+    # Imaginary radii stand for negative products: r |r|.
     xx, yy, zz, xy, xz, yz = (
         r * abs(r) * length**2 for r in table.values(segment, "gyration", "xx yy zz xy xz yz", sex=sex)
     )
@@ -246,6 +247,7 @@ def zatsiorsky(subject: Subject) -> Reference:
     for part, lump in parts("M").items():
         mass = regression(part, "mass", "", subject)[0]
         moments = [regression(part, "inertia", axis, subject)[0] for axis in ("sagittal", "longitudinal", "transverse")]
+        # The foot's long axis lies along x: longitudinal and sagittal moments change places.
         inertia = np.diag(moments if part != "foot" else [moments[1], moments[0], moments[2]])
         lumps[part] = RigidInertia(mass, scale * lump.com, inertia)
         if mass <= 0 or 2 * max(moments) > sum(moments) or min(moments) <= 0:
@@ -355,6 +357,7 @@ def _lump(
         if radius := table.find(kind, "gyration", axis, sex=subject.sex):
             metres = radius.of(subject) * (length if radius.unit == "length" else 1.0)
             wider[i] = abs(metres) / np.sqrt(inertia[i, i])
+    # Scaled on both sides: moments with the square of the radii, products in between.
     return RigidInertia(mass, com, mass * (inertia * np.outer(wider, wider)))  # correlations are kept
 
 

@@ -113,7 +113,9 @@ class ImpreciseCopy:
     def zero_moment_point(self) -> Array:
         """(T, 2) m on the ground, by differences; at both ends and where the postures are held, of standing still."""
         sip, pose = self.body.sip, self.pose
+        # Centres of mass of the segments, lab frame.
         centre = pose.position + np.einsum("tnij,nj->tni", pose.rotation, sip.com)
+        # a - g: what the ground must give per kg.
         pull, change = np.broadcast_to(-np.array(GRAVITY), centre.shape), np.zeros_like(centre)
         if not self.still:
             step, turn, acceleration, spin = (
@@ -121,15 +123,19 @@ class ImpreciseCopy:
                 pose.rotation,
                 *np.zeros((2, *centre.shape)),
             )
+            # Second central difference.
             acceleration[1:-1] = (centre[2:] - 2 * centre[1:-1] + centre[:-2]) / step**2
             # angular velocity from the rotation over two steps; the change of I w is the moment about the centre
             spin[1:-1] = _vector(turn[2:] @ np.swapaxes(turn[:-2], -1, -2)) / (2 * step)
             own = np.array([rigid_inertia(sip.of(name)).inertia for name in self.body.segments])
+            # I_lab = R I R'.
             inertia = turn @ own @ np.swapaxes(turn, -1, -2)
             pull = pull + acceleration
             change = np.asarray(np.gradient((inertia @ spin[..., None])[..., 0], step, axis=0))
+        # Newton and Euler about the lab origin: sum of c x m (a - g) + d(I w)/dt.
         moment = (np.cross(centre, sip.mass[:, None] * pull) + change).sum(axis=1)
         force = (sip.mass[:, None] * pull).sum(axis=1)
+        # Where the moment has no horizontal part.
         return np.asarray(np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:])
 
     def inside(self, share: float) -> Array:

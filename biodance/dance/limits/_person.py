@@ -57,10 +57,12 @@ class ArmLift(Limit):
         ends = [(arm, -_Y) for arm in arms] + [palm(body, side) for side in SIDES]
         tips, tip_slopes = state.points([segment for segment, _ in ends], np.array([place for _, place in ends]))
         roots, root_slopes = state.points(arms * 2, np.zeros((4, 3)))
+        # Tips of the trunk's unit axes less its origin: its rotation, and its slopes, from points alone.
         axes, axis_slopes = state.points([trunk] * 4, np.concatenate([[np.zeros(3)], np.eye(3)]))
         turn, turns = axes[:, 1:] - axes[:, :1], axis_slopes[:, 1:] - axis_slopes[:, :1]
         arm, by = tips - roots, tip_slopes - root_slopes
         seen = np.einsum("tac,tkc->tka", turn, arm)  # in the trunk's frame: ahead, up, right
+        # Product rule: both the trunk and the arm move.
         slope = np.einsum("tac,tkcn->tkan", turn, by) + np.einsum("tacn,tkc->tkan", turns, arm)
         value, change = _left(seen[:, : len(greatest)], greatest)
         return Margins(value, np.einsum("tka,tkan->tkn", change, slope[:, : len(greatest)])[None])
@@ -79,8 +81,10 @@ class ArmLift(Limit):
             else:
                 hand, place = palm(body, SIDES[k % 2])
                 away = pose.points([hand], place[None])[:, 0] - pose.position[:, arm]
+            # R'v: ahead, up, right in the trunk's frame.
             x, y, z = np.moveaxis(np.einsum("tca,tc->ta", trunk, away), 1, 0)
             lift, plane = np.arccos(np.clip(-y / np.sqrt(x**2 + y**2 + z**2), -1.0, 1.0)), np.arctan2(x, z)
+            # Polar form of the ellipse.
             most = 1 / np.hypot(np.sin(plane) / forward, np.cos(plane) / sideways)
             found.append(min(forward, sideways) * (1 - lift / most))
         of = [f"{side}_{what}" for what in ("upper_arm", "hand") for side in SIDES]
@@ -98,9 +102,11 @@ class ArmLift(Limit):
             )
             if flexion not in angles:
                 continue
+            # R_z(f) R_x(a) (-e_y) = (sin f cos a, -cos f cos a, -sin a), solved for f and a below.
             arm = _turn(_Z, angles[flexion]) @ _turn(_X, angles[adduction])
             x, y, z = arm @ -_Y
             forward, sideways = self._greatest()[k]
+            # Unit vector in the horizontal plane, or nothing for an arm that hangs.
             ahead, aside = np.array([x, z]) / max(float(np.hypot(x, z)), 1e-9)
             lift = min(float(np.arctan2(np.hypot(x, z), -y)), 1 / np.hypot(ahead / forward, aside / sideways) - _KEPT)
             out[flexion] = float(np.arctan2(np.sin(lift) * ahead, np.cos(lift)))
@@ -120,16 +126,21 @@ def _left(seen: Array, greatest: Array) -> tuple[Array, Array]:
     """Return what is left (T, K) rad of the lifts of directions ``seen`` (T, K, 3) m, and its slopes by them."""
     flat = np.maximum(np.hypot(seen[..., 0], seen[..., 2]), 1e-9)
     down, square = -seen[..., 1], np.sum(seen**2, axis=-1)
+    # Angle to the down axis.
     lift, least = np.arctan2(flat, down), greatest.min(axis=1)
     share = np.stack([seen[..., 0] / greatest[:, 0], seen[..., 2] / greatest[:, 1]], axis=-1)
     size = np.maximum(np.linalg.norm(share, axis=-1), 1e-12)  # of the direction times `flat`, in half axes
+    # d flat = (x dx + z dz) / flat.
     by_flat = np.stack([seen[..., 0], np.zeros_like(flat), seen[..., 2]], axis=-1) / flat[..., None]
+    # d atan2(flat, down) = (down d flat - flat d down) / (flat² + down²), with d down = -e_y.
     by_lift = (down[..., None] * by_flat + flat[..., None] * _Y) / square[..., None]
     by_size = (
         np.stack([share[..., 0] / greatest[:, 0], np.zeros_like(flat), share[..., 1] / greatest[:, 1]], axis=-1)
         / size[..., None]
     )
+    # 1 / greatest = size / flat, so this is the lift over the greatest one.
     used = lift * size / flat
+    # Product rule for lift, size and 1 / flat.
     slopes = by_lift * (size / flat)[..., None] + (lift / flat)[..., None] * by_size
     slopes -= (lift * size / flat**2)[..., None] * by_flat
     return least * (1 - used), -least[:, None] * slopes
@@ -149,6 +160,7 @@ class FootLoad(Limit):
             return unconcerned(state)
         share, (force, by) = np.array([self.right, self.left]), state.feet
         value = share * state.wrench[:, 2:3] - force[:, :, 2]
+        # Chain rule: foot by total, total by motion.
         slopes = share[:, None] * state.wrench_slopes[:, :, 2:3] - by[None, :, :, 2] @ state.wrench_slopes
         return Margins(value, slopes)
 

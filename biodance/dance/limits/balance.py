@@ -36,6 +36,7 @@ class Balance(Limit):
     def margins(self, state: State) -> Margins:
         """Return the distance of the zero-moment point inside every edge of the reduced support, (T, edges) m."""
         normals, offsets = state.stance.reduced(self.share)
+        # n p + o, distance inside every edge; linear in p.
         return Margins(state.zmp @ normals.T + offsets, normals @ state.zmp_slopes)
 
     def check(self, motion: CheckedMotion) -> Remaining:
@@ -67,5 +68,7 @@ def _inside(point: Array, corners: Array, share: float) -> Array:
     hull = ConvexHull(corners)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     normals, offsets = hull.equations[:, :2], hull.equations[:, 2]
+    # Outward normals, n p + o <= 0 inside.
     room = -(middle @ normals.T + offsets)  # from the middle to every edge
+    # Every edge drawn to `share` of its distance from the middle.
     return np.asarray((share * room - (point - middle) @ normals.T).min(axis=1))

@@ -34,6 +34,7 @@ class Floor(Limit):
         parts = LowParts.of(state.chain.body)
         place = state.placed(parts.segment, parts.place)
         slopes = state.along(parts.segment, place, np.broadcast_to([0.0, 0.0, 1.0], place.shape))
+        # Half of what is left upright, where that is less than the gap.
         return Margins(place[:, :, 2] - parts.radius - np.minimum(self.gap, parts.upright / 2), slopes[None])
 
     def check(self, motion: CheckedMotion) -> Remaining:
@@ -78,6 +79,7 @@ class LowParts:
         place, radius = solids.axis[segment, end], solids.radius[segment]
         soles = [pose.points([foot.segment] * len(foot.outline), foot.outline) for foot in body.feet.values()]
         ground = float(np.min([sole[:, :, 2].min() for sole in soles]))
+        # Height under the round end over the soles, at zero angles.
         under = pose.points(list(segment), place)[0, :, 2] - radius - ground
         upright = np.array([under[segment == one].min() for one in segment])
         kept = upright > 0
@@ -101,6 +103,7 @@ def _lowest(body: Body, pose: Poses) -> Array:
     for segment in np.unique(parts.segment):
         own = parts.segment == segment
         middle, half = parts.place[own].mean(axis=0), (parts.place[own][-1] - parts.place[own][0]) / 2
+        # Height of either end about the middle: + and - the same number; the lower one is - its size.
         over = np.abs(pose.rotation[:, segment, 2] @ half)
         height = pose.position[:, segment, 2] + pose.rotation[:, segment, 2] @ middle
         out.append(height - over - parts.radius[own][0])

@@ -42,6 +42,7 @@ class FootPlacement(Limit):
         away = place - state.stance.ankle[list(state.stance.planted)]
         distance = np.linalg.norm(away, axis=2)
         longest = np.array([float(leg.length(np.radians(self.least_knee))) for leg in hips])
+        # d|r| = r dr / |r|.
         return Margins(longest - distance, -np.einsum("tkc,tkcn->tkn", away / distance[..., None], slope)[None])
 
     def check(self, motion: CheckedMotion) -> Remaining:
@@ -53,6 +54,7 @@ class FootPlacement(Limit):
         sides = list(motion.stance.planted)
         segments = [motion.body.feet[SIDES[side]].segment for side in sides]
         moved = np.linalg.norm(motion.pose.position[:, segments] - motion.stance.ankle[sides], axis=2)
+        # Largest element of R - R_upright: a small angle, rad.
         turned = np.abs(motion.pose.rotation[:, segments] - UPRIGHT).max(axis=(2, 3), initial=0.0)
         off = np.maximum(moved, turned)
         left = _STILL - off

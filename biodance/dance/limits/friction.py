@@ -23,6 +23,7 @@ class Friction(Limit):
     def margins(self, state: State) -> Margins:
         """Return the horizontal force that is left along x and y, (T, 2) N."""
         force, slopes = state.wrench[:, :3], state.wrench_slopes
+        # d|F| = sign(F) dF.
         sign = np.sign(force[:, :2])[None, :, :, None]
         return Margins(
             self.mu * force[:, 2:] - np.abs(force[:, :2]), self.mu * slopes[:, :, 2:3] - sign * slopes[:, :, :2]

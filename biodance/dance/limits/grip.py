@@ -26,6 +26,7 @@ class Grip(Limit):
         place, slope = state.points([segment for segment, _ in palms], np.array([local for _, local in palms]))
         away = place - state.stance.hands[holding]
         distance = np.linalg.norm(away, axis=2)
+        # Direction of |r|'s slope.
         direction = away / np.maximum(distance, 1e-9)[..., None]  # zero at the grip itself
         return Margins(self.loose - distance, -np.einsum("tkc,tkcn->tkn", direction, slope)[None])
 

@@ -21,6 +21,7 @@ class JointRange(Limit):
         limits, angle = state.chain.body.limits, state.x[:, ROOT:]
         rows = np.eye(state.chain.size)[ROOT:]
         value = np.concatenate([angle - limits.lower, limits.upper - angle], axis=1) - np.radians(self.keep)
+        # Constant slopes: the angle is a coordinate itself.
         return Margins(value, repeated(np.concatenate([rows, -rows]), len(angle)))
 
     def check(self, motion: CheckedMotion) -> Remaining:

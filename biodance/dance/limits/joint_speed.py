@@ -21,6 +21,7 @@ class JointSpeed(Limit):
         """Return speed that is left, (T, joints) rad/s."""
         rate = state.v[:, ROOT:]
         slope = -np.sign(rate)[:, :, None] * np.eye(state.chain.size)[ROOT:]
+        # Slopes by x are zero, by v the sign.
         return Margins(self.share * state.chain.body.limits.velocity - np.abs(rate), np.stack([0 * slope, slope]))
 
     def check(self, motion: CheckedMotion) -> Remaining:

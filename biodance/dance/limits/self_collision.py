@@ -68,6 +68,7 @@ def _capsules(state: State, near: float) -> Margins:
     value = distance - solids.radius[first] - solids.radius[second]
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal = (apart / distance[..., None])[:, close]
+    # d|p - q| = n (dp - dq): the places on the lines do not count, since they are the nearest (envelope theorem).
     slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(
         second[close], there[:, close], normal
     )
@@ -76,10 +77,13 @@ def _capsules(state: State, near: float) -> Margins:
 
 def nearest(a: Array, b: Array) -> tuple[Array, Array]:
     """Return where on two line segments (..., 2, 3) their nearest points lie, 0..1 from the first to the second end."""
+    # |r + s d1 - t d2|² is least where A s - B t = -C and B s - E t = F.
     d1, d2, r = a[..., 1, :] - a[..., 0, :], b[..., 1, :] - b[..., 0, :], a[..., 0, :] - b[..., 0, :]
     A, E, B = (np.sum(p * q, axis=-1) for p, q in ((d1, d1), (d2, d2), (d1, d2)))
     C, F = np.sum(d1 * r, axis=-1), np.sum(d2 * r, axis=-1)
+    # Cramer's rule; of parallel lines, A E = B², the numerator is zero, too: s = 0 is as good as any.
     s = np.clip((B * F - C * E) / np.maximum(A * E - B * B, 1e-12), 0.0, 1.0)
+    # Best t for this s, then the best s for that t: clipped at the ends of the segments.
     t = np.clip((B * s + F) / E, 0.0, 1.0)
     s = np.clip((B * t - C) / A, 0.0, 1.0)
     return s, np.clip((B * s + F) / E, 0.0, 1.0)
@@ -91,12 +95,14 @@ def _boxes(state: State, near: float) -> Margins:
     ends = state.placed(np.repeat(limb, 2), solids.axis[limb].reshape(-1, 3)).reshape(len(state.x), -1, 2, 3)
     low, high = np.swapaxes(state.chain.body.boxes[box], 0, 1)
     turn, half = state.rotation[:, box], (high - low) / 2
+    # (p - o)'R: into the box's frame, from its middle.
     local = (ends - state.position[:, box, None]) @ turn - (low + half)[:, None]
     share = deepest(local, half)
     depth, away = outside(_on(local, share), half)
     value = depth - solids.radius[limb]
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal, place = np.einsum("tkij,tkj->tki", turn, away)[:, close], _on(ends, share)[:, close]
+    # The same place as a point of the limb and of the box: only their relative motion counts.
     slopes[0][:, close] = state.along(limb[close], place, normal) - state.along(box[close], place, normal)
     return Margins(value, slopes)
 
@@ -116,8 +122,10 @@ def outside(point: Array, half: Array) -> tuple[Array, Array]:
     """
     over = np.abs(point) - half
     depth = _depth(over)
+    # Inside, the nearest side is the one that is left soonest.
     nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
     free = depth[..., None] > 0
+    # Outside, the direction to the nearest point of the box; sign(point) unfolds the octant.
     return depth, np.where(free, np.maximum(over, 0.0) / np.where(free, depth[..., None], 1.0), nearest_side) * np.sign(
         point
     )
@@ -130,8 +138,10 @@ def _depth(over: Array) -> Array:
 
 def _depth_of(x: Array, y: Array, z: Array) -> Array:
     """Return the same of what lies over each pair of sides (...)."""
+    # Inside: minus the way to the nearest side.
     inner = np.maximum(np.maximum(x, y), z)
     x, y, z = (np.maximum(part, 0.0) for part in (x, y, z))
+    # Outside: length of what lies over the sides.
     beyond = np.sqrt(x * x + y * y + z * z)
     return np.where(beyond > 0, beyond, inner)
 
@@ -149,6 +159,7 @@ def deepest(ends: Array, half: Array) -> Array:
         share = start + width * SAMPLES[:, None, None]
         over = [np.abs(first[k] + share * along[k]) - half[..., k] for k in range(3)]  # far faster than (..., 3)
         best = np.argmin(_depth_of(*over), axis=0)
+        # One sample to either side of the best one encloses the minimum.
         start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
         width = np.minimum(width * 2 / (len(SAMPLES) - 1), 1.0 - start)
     return start + width / 2
@@ -168,6 +179,7 @@ def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple
     ends = np.stack([pose.points(list(range(len(body.segments))), solids.axis[:, k]) for k in (0, 1)], axis=2)
     low, high = np.swapaxes(body.boxes[solids.box], 0, 1)
     turn, middle = pose.rotation[:, solids.box], (low + high) / 2
+    # Into the frame of the box, from its middle.
     local = (ends[:, solids.limb] - pose.position[:, solids.box, None]) @ turn - middle[:, None]
     apart = [
         _limbs_apart(ends[:, solids.first], ends[:, solids.second], near) - solids.radius[solids.second],
@@ -180,6 +192,7 @@ def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple
 
 def _limbs_apart(a: Array, b: Array, enough: float) -> Array:
     """Return the distances (T, K) of lines ``a`` from lines ``b`` (T, K, 2, 3)."""
+    # Triangle inequality: no two points are nearer than the middles less both half lengths.
     out = _length(_middle(a) - _middle(b)) - _length(_along(a)) / 2 - _length(_along(b)) / 2
     near = out < enough
     a, b = a[near], b[near]
@@ -191,6 +204,7 @@ def _limbs_apart(a: Array, b: Array, enough: float) -> Array:
 def _boxes_apart(line: Array, half: Array, enough: float) -> Array:
     """Return the signed distances (T, K) of lines (T, K, 2, 3) from boxes about the origin with half sides (K, 3)."""
     first, along = line[..., 0, :], _along(line)
+    # Middles of equal pieces: no point is farther from one of them than half a piece, and distance falls no faster.
     looked = [_depth(np.abs(first + (k + 0.5) / _LOOKS * along) - half) for k in range(_LOOKS)]
     out = np.min(looked, axis=0) - _length(along) / (2 * _LOOKS)
     near = out < enough
@@ -254,7 +268,9 @@ class _Shapes:
         self.coal: Any = coal
         self.capsules, self.turns, self.boxes = [], [], []
         for (a, b), radius in zip(solids.axis, solids.radius, strict=True):
+            # coal's capsules lie along z: a right-handed frame whose third axis is the line.
             along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+            # Across the axis that is least along the line, so that the product is not small.
             side = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
             side /= np.linalg.norm(side)
             self.capsules.append(coal.Capsule(float(radius), float(np.linalg.norm(b - a))))
@@ -268,6 +284,7 @@ class _Shapes:
         own = np.eye(3) if box else self.turns[other][0]
         first, second = ((pose.rotation[t, s], pose.position[t, s]) for s in (limb, other))
         places = (
+            # R_segment R_own, and its middle in the lab.
             self.coal.Transform3s(first[0] @ self.turns[limb][0], first[1] + first[0] @ self.turns[limb][1]),
             self.coal.Transform3s(second[0] @ own, second[1] + second[0] @ middle),
         )

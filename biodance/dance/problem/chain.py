@@ -84,6 +84,7 @@ class Chain(Sendable):
     def ancestors(self) -> Array:
         """(n, n) 1 where coordinate i (column) moves link k (row), else 0; a link is moved by its own coordinate."""
         table = np.zeros((self.size, self.size))
+        # Root coordinate k is moved by 0 to k; every joint by all six.
         table[:, :ROOT] = np.tril(np.ones((self.size, ROOT)))
         for joint, path in enumerate(self.body.paths):
             table[ROOT + joint, ROOT + np.array(path)] = 1.0
@@ -152,6 +153,7 @@ class Chain(Sendable):
         for side in sides:
             hip, at = turn @ self.legs[side].hip, ankle[..., side, :]
             across = np.sum((x[:, :2] + hip[:, :2] - at[..., :2]) ** 2, axis=1)
+            # Pythagoras with the straight line from hip to ankle; at least 0.1 m, where the ankle is out of reach.
             rise = np.sqrt(np.maximum(self.legs[side].length(knee) ** 2 - across, 0.01))
             heights.append(at[..., 2] + rise - hip[:, 2])
         return np.array(heights)
@@ -166,6 +168,7 @@ class Chain(Sendable):
         from scipy.spatial.transform import Rotation
 
         quaternion = Rotation.from_matrix(self.root_rotation(x)).as_quat()
+        # q and -q are one rotation: the one with a scalar part that is not negative.
         quaternion *= np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
         return np.concatenate([x[:, :3], quaternion, x[:, ROOT:]], axis=1)
 
@@ -175,6 +178,8 @@ class Chain(Sendable):
         drop, tilt = (axis_rotation(np.array(_TURNS[k]), x[:, 3 + k]) for k in (1, 2))
         spin = np.zeros((len(x), 3))
         spin2 = np.zeros((len(x), 3))
+        # From frame to frame, e the axis, R the turn: w becomes R'w + e rate, dw becomes R'dw +
+        # e rate2 + R'w x e rate.
         for k, onward in enumerate((drop, tilt, None)):
             axis = np.array(_TURNS[k])
             spin2 = spin2 + axis * rate2[:, 3 + k, None] + np.cross(spin, axis * rate[:, 3 + k, None])
@@ -182,6 +187,7 @@ class Chain(Sendable):
             if onward is not None:
                 spin, spin2 = (np.einsum("tji,tj->ti", onward, s) for s in (spin, spin2))
         linear = np.einsum("tji,tj->ti", turn, rate[:, :3])
+        # d/dt (R'u) = R'u' - w x R'u.
         linear2 = np.einsum("tji,tj->ti", turn, rate2[:, :3]) - np.cross(spin, linear)
         v = np.concatenate([linear, spin, rate[:, ROOT:]], axis=1)
         a = np.concatenate([linear2, spin2, rate2[:, ROOT:]], axis=1)

@@ -40,6 +40,7 @@ def condition(gram: Array) -> tuple[Array, Array]:
     k).
     """
     value, vector = _spectrum(gram)
+    # d(lambda) = v' dG v, so the gradient is V diag(d cond / d lambda) V'.
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)
     by[..., -1] += 1 / value[..., -1]
@@ -55,8 +56,10 @@ def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
     p -> infinity.
     """
     value, vector = _spectrum(gram)
+    # Divided by the largest and the smallest, so that no power overflows.
     high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
     cond = np.sqrt(value[..., -1] / value[..., 0] * (high.mean(axis=-1) * low.mean(axis=-1)) ** (1 / sharpness))
+    # cond / (2 lambda_i) (lambda_i^p / sum lambda^p - lambda_i^-p / sum lambda^-p).
     by = (
         0.5
         * cond[..., None]
@@ -68,6 +71,7 @@ def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
 
 def _spectrum(gram: Array) -> tuple[Array, Array]:
     value, vector = np.linalg.eigh(gram)
+    # A singular matrix is bad, not infinitely bad.
     return np.maximum(value, 1e-12 * np.maximum(value[..., -1:], 1e-12)), vector
 
 
@@ -108,6 +112,7 @@ def total(
     alike = grouped((tuple(columns), i) for i, columns in enumerate(pick) if columns and weight[i] > 0)
     for picked, segments in alike.items():
         block = np.ix_(segments, picked, picked)
+        # Several segments with the same columns as one batch (S, k, k).
         cond, part = measure(grams[block])
         value += float(weight[segments] @ cond)
         slope[block] = weight[segments][:, None, None] * part
@@ -120,6 +125,7 @@ def criteria(blocks: Blocks, grams: Array) -> Array:
     whole = [i for i, pick in enumerate(blocks.first) if len(pick) == 3 and blocks.weight[i] > 0]
     if whole:
         least, most = extremes(grams[:, whole])
+        # cond(W) is the root of that of W'W.
         out += np.sqrt(most / np.maximum(least, 1e-12)) @ blocks.weight[whole]
     for i, pick in enumerate(blocks.first):
         if 0 < len(pick) < 3 and blocks.weight[i] > 0:
@@ -133,35 +139,43 @@ def extremes(A: Array) -> tuple[Array, Array]:
     (doi:10.1145/355578.366316): an exchange asks for a million of them.
     """
     mean = (A[..., 0, 0] + A[..., 1, 1] + A[..., 2, 2]) / 3
+    # B = A - mean 1 has the trace zero.
     a, b, c = (A[..., i, i] - mean for i in range(3))
     d, e, f = A[..., 0, 1], A[..., 1, 2], A[..., 0, 2]
+    # p² = tr(B²) / 6 and det(B) / 2: the cubic equation is solved by the cosine of a triple angle.
     radius = np.sqrt((a * a + b * b + c * c + 2 * (d * d + e * e + f * f)) / 6)
     half = (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)) / 2
     angle = np.arccos(np.clip(half / np.maximum(radius**3, 1e-300), -1.0, 1.0)) / 3
+    # mean + 2 p cos(angle + 2 pi k / 3): k = 0 is the largest, k = 1 the smallest.
     return mean + 2 * radius * np.cos(angle + 2 * np.pi / 3), mean + 2 * radius * np.cos(angle)
 
 
 def uprights(state: State) -> Array:
     """Return (T, N, 3) the vertical in each segment's frame."""
+    # Row z of lab_R_segment is R'e_z.
     return state.rotation[:, :, 2, :]
 
 
 def static_grams(up: Array) -> Array:
     """Return (N, 3, 3) sum over postures of 1 - u u', the Gram matrices of the first moments over g²."""
+    # [u]x'[u]x = 1 - u u'; a little of the identity keeps the smallest eigenvalue above zero.
     return len(up) * np.eye(3) - np.einsum("tni,tnj->nij", up, up) + 1e-6 * np.eye(3)
 
 
 def upright_slopes(state: State, slope: Array) -> Array:
     """Return (T, n) derivative by x of sum <slope (T, N, 3), u>."""
+    # du = -R'(w x e_z), so <s, du> = w (R s x e_z).
     lab = np.einsum("tnij,tnj->tni", state.rotation, slope)
     lever = np.stack([lab[..., 1], -lab[..., 0], 0 * lab[..., 0]], axis=-1)  # lab x z
     moved = state.chain.ancestors[list(state.chain.carriers)]
+    # Sum over the segments that coordinate k moves.
     return np.einsum("tnc,tkc,nk->tk", lever, state.twists[:, :, 3:], moved)
 
 
 _LINEAR = np.zeros((3, 3, 6))
 """[c]: the moment K (3, 6) by the six inertias of one segment of unit angular acceleration along c."""
 for _k, (_i, _j) in enumerate(TENSOR):
+    # Both off-diagonal elements of a symmetric tensor.
     _LINEAR[_j, _i, _k] = _LINEAR[_i, _j, _k] = 1.0
 _SQUARE = np.einsum("bij,cjk->bcik", skew(np.eye(3)), _LINEAR)
 """(3, 3, 3, 6): sum_bc w_b w_c _SQUARE[b, c] = w x (I w)."""
@@ -169,6 +183,7 @@ _SQUARE = np.einsum("bij,cjk->bcik", skew(np.eye(3)), _LINEAR)
 
 def moments(w: Array, dw: Array) -> Array:
     """Return K (..., 3, 6) of angular velocity and acceleration (..., 3) in the segment's frame."""
+    # K phi = I dw + w x (I w).
     return np.einsum("...c,cik->...ik", dw, _LINEAR) + np.einsum("...b,...c,bcik->...ik", w, w, _SQUARE)
 
 
@@ -176,6 +191,7 @@ def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
     """Return angular velocity and acceleration (T, S, 3) of segments in their own frames."""
     links = [state.chain.carriers[i] for i in segments]
     turn = state.rotation[:, segments]
+    # R's: into the segment's frame.
     w, dw = (np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))
     return w, dw
 
@@ -189,13 +205,17 @@ def dynamic_grams(state: State, segments: list[int]) -> Array:
 def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
     """Return (3, T, n) derivative by x, v, a of sum <slope (S, 6, 6), K'K>."""
     w, dw = turning(state, segments)
+    # d<S, K'K> = <2 K S, dK>, S symmetric.
     Y = 2 * np.einsum("tsik,skl->tsil", moments(w, dw), slope)
     by_dw = np.einsum("tsik,cik->tsc", Y, _LINEAR)
+    # Derivative of a quadratic form in w: both factors.
     by_w = np.einsum("tsik,tsb,bcik->tsc", Y, w, _SQUARE + np.swapaxes(_SQUARE, 0, 1))
     links = [state.chain.carriers[i] for i in segments]
     turn, moved = state.rotation[:, segments], state.chain.ancestors[links]
+    # Back to the lab frame, where the axes are.
     by_dw, by_w = (np.einsum("tsij,tsj->tsi", turn, s) for s in (by_dw, by_w))
     axis, V, A = state.twists[..., 3:], state.velocity[..., 3:], state.acceleration[..., 3:]
+    # Section 12 of the derivations, angular parts, in the segment's frame: J_i x (...) of that frame is taken off.
     swept = cross(V, axis)
     gap = V[:, links][:, :, None] - V[:, None]
     back = cross(swept[:, None], gap) - cross(axis, A)[:, None]
@@ -225,15 +245,19 @@ def effort(state: State) -> tuple[float, Array]:
     away = (angle - scale.rest) / scale.half
     way = np.where(angle > scale.rest, scale.upward, scale.downward)
     near = (angle - scale.rest) / way
+    # Smooth |away|.
     root = np.sqrt(away**2 + _SOFT**2)
     value = (root - _SOFT + STOP * near**8) @ counts
+    # d root / d away = away / root.
     by = counts * (away / root / scale.half + 8 * STOP * near**7 / way)
     for right, left in scale.pairs:
         if counts[right] and counts[left]:
             gap = (angle[:, right] - angle[:, left]) / scale.half[right]
+            # The mean is over joints: a pair counts for two.
             value = value + 2 * SIDE * gap**2
             by[:, right] += 4 * SIDE * gap / scale.half[right]
             by[:, left] -= 4 * SIDE * gap / scale.half[right]
+    # Mean over the joints that count, and over the samples.
     share = 1.0 / (max(1.0, counts.sum()) * len(angle))
     slopes[0][:, ROOT:] = share * by
     return float(share * value.sum()), slopes
@@ -286,11 +310,13 @@ class PostureInformation:
         self.chain, self.centres, self.factor = chain, centres, prior_factor(chain.body.sip)
         before = np.sum(self.factor**2, axis=1)
         self.weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
+        # tr(scale C scale'): sum of the variances over those of the table, weighted.
         self.scale = self.factor * np.sqrt(self.weight / np.where(before > 0, before, 1.0))[:, None]
         if centres:
             self.factor = np.pad(self.factor, ((0, 0), (0, CENTRES)))
             self.scale = block_diag(self.scale, np.eye(CENTRES))
         way = rest_to_rest(plan.move, via=0, rate=SAMPLE_RATE)
+        # Both ends are at rest: the postures, which count on their own.
         self._way = [part[1:-1] for part in (way.position, way.velocity, way.acceleration)]
 
     @property
@@ -301,6 +327,7 @@ class PostureInformation:
     def white(self, W: Array) -> Array:
         """Return regressors (G, 6 T, 10 N) per standard deviation of error and of the table, (G, 6 T, k)."""
         error = np.tile(SAMPLE_ERROR, W.shape[1] // 6)
+        # F^-1 W S, with S the root of the table's covariance.
         flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
         return np.asarray(flat.reshape(*W.shape[:2], -1))
 
@@ -311,6 +338,7 @@ class PostureInformation:
 
     def of_ways(self, ends: Array) -> Array:
         """Return the rows (G, m, k) of going straight from one posture to another, ``ends`` (G, 2, n)."""
+        # The splines are linear in the ends.
         x, v, a = ((part @ ends).reshape(-1, ends.shape[2]) for part in self._way)
         W = regressor(self.chain.body, self.chain.motion(np.arange(len(x)) / SAMPLE_RATE, x, v, a))
         return self.white(np.asarray(W).reshape(len(ends), -1, W.shape[-1]))
@@ -322,11 +350,13 @@ class PostureInformation:
 
     def gains(self, posterior: Array, rows: Array) -> Array:
         """Return by how much each of ``rows`` (..., m, k) lowers the weighted variance that a posterior leaves."""
+        # tr(scale Z'Z scale').
         return np.asarray(np.sum((learned(posterior, rows) @ self.scale.T) ** 2, axis=(-2, -1)))
 
 
 def learned(posterior: Array, rows: Array) -> Array:
     """Return Z (..., m, k) with new covariance = ``posterior`` - Z'Z (k, k) after whitened ``rows`` (..., m, k)."""
+    # Woodbury: P - P X'(1 + X P X')^-1 X P, with L L' = 1 + X P X' and Z = L^-1 X P.
     spread = rows @ posterior
     factor = np.linalg.cholesky(np.eye(rows.shape[-2]) + spread @ np.swapaxes(rows, -1, -2))
     return np.asarray(np.linalg.solve(factor, spread))
@@ -347,5 +377,7 @@ def rows_of_centres(chain: Chain, x: Array, columns: int) -> Array:
     for k, (near, far) in enumerate(_BALLS):
         first, second = (turned[body.segments.index(name)] for name in (near, far))
         here = columns - CENTRES + 6 * k
+        # c - R d = what is to be known of the distance; R = R_near' R_far.
         out[3 * k : 3 * k + 3, here : here + 6] = np.hstack([np.eye(3), -first.T @ second])
+    # Prior deviation over error.
     return out * _UNKNOWN / _SKIN

@@ -23,6 +23,7 @@ def room_on_plates(stances: Iterable[Stance]) -> Array:
     their soles with `AROUND` on every side, and the legs of a stool.
     """
     low, high = _ends(stances)
+    # Lab axes are (ahead, left); room is told from side to side first.
     return np.asarray((high - low)[::-1])
 
 
@@ -41,6 +42,7 @@ def plate_corners(stances: Iterable[Stance], plate: tuple[float, float]) -> Arra
     middle.
     """
     low, high = _ends(stances)
+    # Plate sizes are (from side to side, ahead), the lab's x is ahead.
     half = np.array(plate[::-1]) / 2
     return (low + high) / 2 + half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
 
@@ -76,6 +78,7 @@ def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, 
     over = np.maximum(_room(body, plan, plan.wide, plan.forward) - plate, 0.0)
     wide, forward = plan.wide, plan.forward
     if over[0] > 0:
+        # apart(body, 1) is the distance at wide = 1.
         wide = max((apart(body, plan.share, wide=wide) - float(over[0])) / apart(body, 1.0), LEAST_WIDE)
     if over[1] > 0:
         forward = max(forward - float(over[1]), LEAST_FORWARD)

@@ -31,6 +31,7 @@ def no_objective(state: State) -> tuple[float, Array]:
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
     """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
+    # Planted legs follow the pelvis.
     held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
     return [c for c in range(chain.size) if c not in held]
 
@@ -53,6 +54,7 @@ class NonlinearProgramme:
     def state(self, y: Array) -> State:
         """Return the motion of the points y (K * free,)."""
         samples = self.base.copy()
+        # x, v and a are linear in the points: basis (T, K) times points (K, free).
         samples[:, :, self.free] += self.basis @ y.reshape(self.basis.shape[2], -1)
         return close_legs(self.chain, self.stance, *samples)
 
@@ -68,6 +70,7 @@ class Evaluation:
         self.problem, self.state = problem, state
         self.value, self._slope = problem.objective(state)
         self._found = [(limit.margins(state), limit.scale) for limit in problem.limits]
+        # (limits, T, 1): the same reserve for all columns of a limit.
         spare = problem.reserve.T[:, :, None]
         self._spare = [m.value / scale - r for (m, scale), r in zip(self._found, spare, strict=True)]
         self.margins = np.concatenate([np.empty(0), *(spare.ravel() for spare in self._spare)])
@@ -91,15 +94,18 @@ class Evaluation:
         for margin, scale in self._found:
             size = margin.value.size
             inside = rows[(rows >= first) & (rows < first + size)] - first
+            # The margins lie sample after sample in the flat vector.
             time, which = np.unravel_index(inside, margin.value.shape)
             parts.append(self._chain([s[time, which] / scale for s in margin.slopes], time, closure))
             first += size
+        # The objective is one number: its slopes by all samples add up.
         gradient = self._chain(list(self._slope), np.arange(frames), closure).sum(axis=0)
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
     def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
         """Return slopes (R, K * free) by the points, of slopes (R, n) by x, v, a at the instants ``time`` (R,)."""
         free, basis = self.problem.free, self.problem.basis
+        # Chain rule through the planted legs: x(root), v(root, v), a(root, v, a).
         by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
             by[0] += closure.turned(slopes[1], "v", time)
@@ -108,6 +114,7 @@ class Evaluation:
             by[0] += closure.turned(slopes[2], "ax", time)
             by[1] += closure.turned(slopes[2], "av", time)
             by.append(closure.followed(slopes[2], time))
+        # d/dy_kf = sum over x, v, a of basis_tk times slope_f.
         out = sum(basis[k][time][:, :, None] * part[:, None, free] for k, part in enumerate(by))
         return np.asarray(out).reshape(len(time), basis.shape[2] * len(free))
 
@@ -146,9 +153,11 @@ def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: in
     point, hessian = evaluate(y), np.eye(n)
     radius = _RADIUS
     for _ in range(iterations):
+        # Only margins that a step could reach enter the programme.
         rows = np.flatnonzero(point.margins < _NEAR)
         gradient, jacobian = point.slopes(rows)
         step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
+        # Fall of the merit function that the linear model promises.
         predicted = -(gradient @ step) + WEIGHT * (worst(point.margins) - worst(point.margins[rows] + jacobian @ step))
         trial = evaluate(y + step)
         gained = point.value - trial.value + WEIGHT * (worst(point.margins) - worst(trial.margins))
@@ -161,6 +170,7 @@ def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: in
         elif gained > 0.7 * predicted:
             radius = min(2 * radius, 1.0)
         new_gradient, new_jacobian = trial.slopes(rows)
+        # Change of the gradient of the Lagrangian, f - price' c, with the prices of this step.
         hessian = update(hessian, step, new_gradient - gradient - price @ (new_jacobian - jacobian))
         y, point = y + step, trial
         if gained < _SETTLED and worst(point.margins) < 1e-4:
@@ -180,21 +190,29 @@ def quadratic_step(
     from scipy.optimize import nnls
 
     n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))
+    # The largest change of a linear margin in the box is radius times the sum of |slopes|.
     within = margins < radius * np.abs(jacobian).sum(axis=1) + 1 / WEIGHT  # the others cannot be reached by this step
     jacobian, margins = jacobian[within], margins[within]
+    # H = L L', z = L'd + L^-1 g: the quadratic form becomes |z|² / 2.
     lower = np.linalg.cholesky(hessian)
+    # Margins, and the trust region as two bounds of every variable.
     rows = np.concatenate([jacobian, box, -box])
     needed = np.concatenate([-margins, np.full(2 * n, -radius)])
     slack = np.concatenate([np.full(len(jacobian), 1 / WEIGHT), np.zeros(2 * n)])
+    # Rows of J L^-T: J d = inner (z - shift).
     inner = np.linalg.solve(lower, rows.T).T
     shift = np.linalg.solve(lower, gradient)
+    # t + t²/2 = (t + 1)²/2 - 1/2: the last variable is t + 1, at least 1.
     G = np.concatenate([np.column_stack([inner, slack]), np.eye(n + 1)[-1:]])
     h = np.concatenate([needed + inner @ shift + slack, [1.0]])
     try:
+        # Least distance |u|, G u >= h, by NNLS (Lawson and Hanson): min |[G'; h'] m - (0, ..., 0, 1)|, m >= 0.
         multiplier, _ = nnls(np.vstack([G.T, h]), np.eye(n + 2)[-1], maxiter=20 * len(h))
     except RuntimeError:
         return np.zeros(n), price
+    # u = G'm / (1 - h'm); m over the same number are the multipliers.
     rest = max(1.0 - float(h @ multiplier), 1e-12)
+    # d = L^-T (z - shift).
     step = np.linalg.solve(lower.T, (G.T @ multiplier)[:n] / rest - shift)
     price[within] = np.minimum(multiplier[: len(jacobian)] / rest, WEIGHT)
     return np.clip(step, -radius, radius), price
@@ -207,8 +225,10 @@ def update(hessian: Array, step: Array, change: Array) -> Array:
     if bend < 1e-14:
         return hessian
     along = float(step @ change)
+    # Powell: mix y with H s so that s'y = 0.2 s'H s at least.
     mix = 1.0 if along >= 0.2 * bend else 0.8 * bend / (bend - along)
     change = mix * change + (1 - mix) * curved
+    # BFGS: H - H s s'H / s'H s + y y' / s'y.
     out = hessian - np.outer(curved, curved) / bend + np.outer(change, change) / float(step @ change)
     out = (out + out.T) / 2
     sound = np.isfinite(out).all() and float(np.linalg.eigvalsh(out)[0]) > 1e-6 * max(float(np.abs(out).max()), 1e-6)

@@ -156,6 +156,7 @@ def _own_limits(body: Body, own: Body, person: PersonLimits) -> list[Limit]:
         forward, sideways = np.degrees([own.limits.upper[f], -own.limits.lower[a]])
         less = own.limits.upper[f] < body.limits.upper[f], own.limits.lower[a] > body.limits.lower[a]
         if any(less):
+            # A direction without a limit of its own goes as far as the other one.
             forward, sideways = (forward if less[0] else sideways), (sideways if less[1] else forward)
             lifts |= {f"{side}_forward": max(LEAST_LIFT, forward), f"{side}_sideways": max(LEAST_LIFT, sideways)}
     out = list[Limit]()
@@ -199,12 +200,14 @@ def limit_body(body: Body, person: PersonLimits) -> JointLimits:
     lower, upper, strength = limits.lower.copy(), limits.upper.copy(), np.ones(len(body.joints))
     for key, share in person.range_shares:
         for j in joints(body, key):
+            # Towards the resting angle, which stays legal.
             rest = min(max(0.0, lower[j]), upper[j])
             lower[j], upper[j] = rest + share * (lower[j] - rest), rest + share * (upper[j] - rest)
     for key, low, high in person.ranges:
         for j in joints(body, key):
             if math.isfinite(low) and math.isfinite(high):
                 _check_range(body, j, low, high)
+            # Cut to the joint's own range, so that the two never cross.
             lower[j] = min(max(lower[j], low), limits.upper[j])
             upper[j] = max(min(upper[j], high), limits.lower[j])
     for key, share in person.strengths:
@@ -419,6 +422,7 @@ def _at_most(path: Path, raw: dict[str, Any]) -> _Ranges:
         if moved is None:
             raise UnknownName.of(f"movement in at_most_deg of {path}", key, (*_MOVES, *_JOINTS))
         for joint, sense in moved:
+            # A sense of -1 turns the limit round: -angle below, infinite above.
             low, high = sorted((math.radians(angle) * sense, -math.inf * sense))
             out.append((joint, low, high))
     return out

@@ -107,6 +107,7 @@ def capsule(body: Body, segment: int) -> tuple[Array, float]:
     low, high = body.boxes[segment]
     half, centre = (high - low) / 2, (high + low) / 2
     axis = int(np.argmax(half))
+    # Radius of the smaller half width: the capsule lies inside the box.
     radius = float(np.sort(half)[0])
     reach = max(half[axis] - radius, _LEAST * radius) * np.eye(3)[axis]
     return np.array([centre - reach, centre + reach]), radius
@@ -149,6 +150,7 @@ def _up(above: list[int], segment: int) -> list[int]:
 def _apart(above: list[int], i: int, j: int) -> int:
     """Return how many segments apart two segments are along the tree."""
     one, two = _up(above, i), _up(above, j)
+    # What both ways to the root share drops out.
     return len(set(one) ^ set(two))
 
 
@@ -167,7 +169,9 @@ def points_apart(a: Array, b: Array) -> Array:
 
 def points_off_box(body: Body, pose: Poses, points: Array, segment: int) -> Array:
     """Return the least distance (T,) m of ``points`` (T, K, 3), lab frame, from the box of a segment; 0 inside it."""
+    # R'(p - o): into the segment's frame.
     local = np.einsum("tji,tkj->tki", pose.rotation[:, segment], points - pose.position[:, segment, None])
     low, high = body.boxes[segment]
+    # Per axis how far outside; all zero within.
     beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
     return np.asarray(np.linalg.norm(beyond, axis=2).min(axis=1))

@@ -55,12 +55,15 @@ def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
 def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
     """Return the basis of a rest-to-rest transition of ``duration`` s at instants ``time`` (n,) in [0, duration]."""
     count = via + 6  # two ends with position, velocity and acceleration each, and the via points
+    # Clamped: the end knots come degree + 1 times, and count - degree - 1 lie between.
     inner = np.linspace(0, duration, count - _DEGREE + 1)[1:-1]
     knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.full(_DEGREE + 1, duration)])
     spline = BSpline(knots, np.eye(count), _DEGREE)
     stops = np.array([0.0, duration])
     through = np.linspace(0, duration, via + 2)
+    # Values at all points, then first and second derivatives at both ends: as many as coefficients.
     conditions = np.concatenate([spline(through), spline(stops, nu=1), spline(stops, nu=2)])
+    # Velocities and accelerations at the ends are zero: their columns of the inverse are not needed.
     coefficients = np.linalg.inv(conditions)[:, : via + 2]
     return Basis(time, *(spline(time, nu=nu) @ coefficients for nu in range(3)))
 

@@ -79,6 +79,7 @@ class Stance(Sendable):
             from scipy.optimize import linprog
 
             normals, offsets = self.reduced(self.share)
+            # Deepest point: maximise z subject to normals p + offsets >= depth z.
             depth = np.ones(len(normals))
             depth[: len(self.on(0, 1).reduced(self.share)[1])] = _COMMON
             rows = np.column_stack([-normals, depth])
@@ -104,6 +105,7 @@ class Stance(Sendable):
             return np.concatenate(normals), np.concatenate(offsets)
         corners = self.centre + share * (self.support - self.centre)
         along = np.roll(corners, -1, axis=0) - corners
+        # Counter-clockwise, so the inside is to the left of every edge.
         normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
         return normals, -np.einsum("ij,ij->i", normals, corners)
 
@@ -154,6 +156,7 @@ def stance(
     half = apart(body, share, wide=wide) / 2
     ankle = np.array([[right, -half, height], [0.0, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
+        # Foot frame (ahead, up, right) to lab (ahead, left, up).
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
         for k, o in enumerate(body.feet[side].outline for side in SIDES)
     ]
@@ -192,6 +195,7 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
     if share >= 1.0:
         return usual
     middle, wide = (outer - inner) / 2, outer + inner
+    # share (h + outer) = h + middle - (share / 2 - STRIP) wide, solved for 2 h.
     widest = 2 * (share * outer - middle + (share / 2 - STRIP) * wide) / (1 - share)
     return min(usual, max(widest, _CLEAR * 2 * inner))
 
@@ -269,6 +273,7 @@ def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
         return total[:, None] * chosen[:, None], np.broadcast_to(
             chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6)
         )
+    # Complex step: the imaginary part is the derivative; (T, in, foot, out) to (T, foot, out, in) after both swaps.
     stepped = total[:, None] + 1j * _TINY * np.eye(6)
     derivative = np.swapaxes(
         _share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / _TINY, 1, 2
@@ -279,13 +284,16 @@ def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
 def _share(total: Array, centres: Array) -> Array:
     force, moment = total[:, :3], total[:, 3:]
     point = np.stack([-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2]], axis=1)
+    # Not a norm: an absolute value would lose the imaginary part.
     reach = [np.sqrt(np.sum((point - c[:2]) ** 2, axis=1)) for c in centres]
     right = reach[1] / (reach[0] + reach[1])
+    # Weighted mean of the centres: so placed, both forces together have their moment about the point.
     middle = right[:, None] * centres[0, :2] + (1 - right[:, None]) * centres[1, :2]
     twist = moment[:, 2] - point[:, 0] * force[:, 1] + point[:, 1] * force[:, 0]
     feet = []
     for part, centre in ((right, centres[0]), (1 - right, centres[1])):
         x, y = (point + centre[:2] - middle).T
+        # r x F on the ground, z = 0, and the twist in the same share.
         own = np.stack([y * force[:, 2], -x * force[:, 2], x * force[:, 1] - y * force[:, 0] + twist], axis=1)
         feet.append(part[:, None] * np.concatenate([force, own], axis=1))
     return np.stack(feet, axis=1)

@@ -71,11 +71,13 @@ class State:
     @cached_property
     def velocity(self) -> Array:
         """(T, n, 6) V_k of every link."""
+        # V_k = sum over the coordinates that move k of J_i v_i.
         return self.chain.ancestors @ (self.twists * self.v[:, :, None])
 
     @cached_property
     def acceleration(self) -> Array:
         """(T, n, 6) A_k of every link."""
+        # dJ_i/dt = V_i x J_i.
         return self.chain.ancestors @ (
             self.twists * self.a[:, :, None] + spatial_cross(self.velocity, self.twists) * self.v[:, :, None]
         )
@@ -90,6 +92,7 @@ class State:
         """
         if not self.sloped:
             return np.zeros((*place.shape[:2], self.chain.size))
+        # Dual: d · (velocity of p) = (d, p x d) · J_i.
         wrench = wrench_of_force(direction, place)
         return (wrench @ np.swapaxes(self.twists, 1, 2)) * self.chain.ancestors[np.array(self.chain.carriers)[segment]]
 
@@ -125,6 +128,7 @@ class State:
     @cached_property
     def wrench(self) -> Array:
         """(T, 6) N, N·m needed from the ground, about the lab origin, force first."""
+        # The ground alone holds the root: J_i'W = force_i for its six coordinates.
         return np.asarray(np.linalg.solve(self.twists[:, :ROOT], self.force[:, :ROOT, None])[..., 0])
 
     @cached_property
@@ -133,6 +137,7 @@ class State:
         if not self.sloped:
             return self._dynamics[1][:, :, :ROOT]
         inner = self._dynamics[1][:, :, :ROOT].copy()
+        # J'dW = d(force) - d(J')W.
         inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
         return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
 
@@ -147,10 +152,12 @@ class State:
         """(3, T, 2, n) derivative of the zero-moment point with respect to x, v, a."""
         slopes = self.wrench_slopes
         turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
+        # Quotient rule.
         return np.asarray((turned - self.zmp[:, :, None] * slopes[:, :, None, 2]) / self.wrench[:, 2, None, None])
 
     def moved_twists(self, columns: list[int], wrench: Array) -> Array:
         """Return (T, k, n) derivative by x of J_k' F for the coordinates ``columns`` and a fixed wrench (T, 6)."""
+        # dJ_k/dx_i = J_i x J_k for every i before k in the chain.
         swept = self.chain.ancestors[columns] - np.eye(self.chain.size)[columns]
         pairs = spatial_cross(self.twists[:, None], self.twists[:, columns, None])
         return np.einsum("tkic,tc->tki", pairs, wrench) * swept
@@ -184,6 +191,7 @@ class State:
         out = self.force.copy()
         for side in self.stance.planted:
             columns = self.chain.leg_columns[side]
+            # J_k'F of its foot: what the ground takes over.
             out[:, columns] -= np.einsum("tkc,tc->tk", self.twists[:, columns], self.feet[0][:, side])
         return out[:, ROOT:]
 
@@ -195,6 +203,7 @@ class State:
         slopes = self._dynamics[1].copy()
         for side in self.stance.planted:
             columns = self.chain.leg_columns[side]
+            # Chain rule: foot by total, total by motion.
             share = self.feet[1][:, side] @ self.wrench_slopes
             slopes[:, :, columns] -= self.twists[:, columns] @ share
             slopes[0][:, columns] -= self.moved_twists(columns, self.feet[0][:, side])
@@ -222,15 +231,18 @@ def close_legs(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> St
     x, v, a = chain.plant(x, stance.planted, stance.ankle), v.copy(), a.copy()
     legs = [chain.leg_columns[side] for side in stance.planted]
     for columns in legs:
+        # Zero until they are solved for below.
         v[:, columns] = a[:, columns] = 0.0
     still = State(chain, stance, x, v, a)
     if still.still:
         return still
     twists = still.twists
     for columns in legs:
+        # The foot's twist is zero: J_leg v_leg = -J_root v_root.
         v[:, columns] = _solve(twists[:, columns], -np.einsum("tic,ti->tc", twists[:, :ROOT], v[:, :ROOT]))
     moving = still._sharing(State(chain, stance, x, v.copy(), a), ("_frames",))
     for columns in legs:
+        # With a_leg = 0 the foot still has the acceleration A: J_leg a_leg = -A.
         a[:, columns] = _solve(twists[:, columns], -moving.acceleration[:, columns[-1]])
     return still._sharing(State(chain, stance, x, v, a), ("_frames",))
 
@@ -256,10 +268,14 @@ class Closure:
         if state.still:
             return
         V, A = state.velocity, state.acceleration
+        # V x J, the change of J in time.
         turned = spatial_cross(V, state.twists)
+        # The foot is still, V_n = A_n = 0, in the formulas above.
         by_v, by_ax = -spatial_cross(state.twists, V), -spatial_cross(state.twists, A) - spatial_cross(turned, V)
+        # V_i x J_i - J_i x V_i = 2 V_i x J_i.
         rows_v, rows_ax, rows_av = (np.swapaxes(rows, 1, 2) for rows in (by_v, by_ax, 2 * turned))
         for (leg, blocks), inv in zip(self.legs, inverse, strict=True):
+            # Implicit functions: J_leg d(leg) = -(what the root does and, through x and v, the leg itself).
             x = blocks["x"]
             blocks["v"] = v = inv @ (rows_v[:, :, root] + rows_v[:, :, leg] @ x)
             blocks["ax"] = inv @ (rows_ax[:, :, root] + rows_ax[:, :, leg] @ x + rows_av[:, :, leg] @ v)
@@ -278,5 +294,6 @@ class Closure:
     def _handed(self, out: Array, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
         for leg, blocks in self.legs:
             if kind in blocks:
+                # Row vector times (6, 6): slope by the leg times d(leg) / d(root).
                 out[:, :ROOT] += (slopes[:, None, leg] @ blocks[kind][time])[:, 0]
         return out

@@ -352,6 +352,7 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
     x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
+            # Rows of postures with this word of this part.
             rows = index[:, column] == k
             turn, aside, ahead = (0.0, 0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps it on the seat
             x[rows, _TURN] += turn
@@ -378,8 +379,11 @@ def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
         low, high = limits.lower[np.array(arm) - ROOT] + _FROM_STOP, limits.upper[np.array(arm) - ROOT] - _FROM_STOP
         for _ in range(_STEPS):
             place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
+            # Away from the present angles towards the elbow's.
             J, out = slope[:, 0][:, :, arm], np.array(_ELBOW_OUT) - x[:, arm]
+            # Damped pseudoinverse J'(J J' + d 1)^-1.
             inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(3))
+            # out + J^+ (e - J out) = J^+ e + (1 - J^+ J) out: `out` acts in the null space of the palm's place.
             left = stance.hands[side] - place[:, 0] - np.einsum("sij,sj->si", J, out)
             step = np.einsum("sij,sj->si", inverse, left) + out
             x[:, arm] = np.clip(x[:, arm] + step, np.minimum(low, high), np.maximum(low, high))
@@ -402,8 +406,10 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
     along = stance if stance.over is None else stance.on(stance.over)
     x[:, :2] = middle = np.array([along.centre[0] - _BACK, stance.centre[1]])
     for _ in range(_ROUNDS):
+        # The lower of both: no planted leg is longer than it can be.
         x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
         x = chain.plant(x, stance.planted, stance.ankle)
+        # Moving the pelvis moves nearly all of the body with it.
         x[:, :2] += middle - chain.mass_centre(x)[:, :2]
     x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
     return chain.plant(x, stance.planted, stance.ankle)
@@ -444,6 +450,7 @@ def _short(table: PostureTable, limits: tuple[Limit, ...]) -> Array:
     state, rows = State(table.chain, table.stance, table.x, rest, rest, sloped=False), list[Array]()
     for limit in (limit for limit in limits if limit.at_rest):
         reserve = limit.straight_reserve(table.stance)
+        # In scales of the limit: what is lacking of the reserve.
         rows.append(reserve - limit.margins(state).value.min(axis=1, initial=np.inf) / limit.scale)
     return np.array(rows)
 

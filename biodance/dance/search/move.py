@@ -97,13 +97,17 @@ class Task:
         """
         basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
         points = np.stack([self.ends[0], *via, self.ends[1]])
+        # The points of the free coordinates are the unknowns; zero here, so that they only add.
         points[1:3, free] = 0.0
         parts = np.stack([basis.position, basis.velocity, basis.acceleration])
         s = time / self.duration
+        # Least jerk: share of the way.
         way = s**3 * (10 - 15 * s + 6 * s**2)
         least = [max(reserve, limit.move_reserve) if reserve > BETWEEN else reserve for limit in kept]
+        # 4 w (1 - w): zero at both ends, one in the middle.
         bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
         share = np.array(least) * bell
+        # Columns 1 and 2 of the basis belong to the via points.
         return NonlinearProgramme(
             self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share
         )
@@ -156,7 +160,9 @@ class MoveObjective:
     def __call__(self, state: State) -> tuple[float, Array]:
         """Return the objective and its slopes by x, v, a."""
         gap = state.zmp - state.stance.centre
+        # 100 dm² in a m².
         value = CENTRE * (100 * float(np.mean(np.sum(gap**2, axis=1))))  # dm²
+        # Gradient of a mean of squares: 2 gap / T, times 100 dm².
         slope = CENTRE * (200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes))
         if self.task.blocks.simplicity:
             hard, by = effort(state)
@@ -165,12 +171,14 @@ class MoveObjective:
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
         if not self.share or not segments:
             return value, slope
+        # Sum over samples times dt: an integral over the time of the whole move.
         grams = (
             self.history
             + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID
             + _LITTLE * np.eye(6)
         )
         chosen = np.zeros(len(weight))
+        # Weights add up to `share`.
         chosen[segments] = self.share * weight[segments] / weight[segments].sum()
         found, by = total(chosen, grams, picks, measure=_logarithm)
         return value + found, slope + dynamic_slopes(state, segments, by[segments] * self.task.stretch / GRID)
@@ -178,6 +186,7 @@ class MoveObjective:
 
 def _logarithm(gram: Array) -> tuple[Array, Array]:
     value, slope = condition(gram)
+    # d log c = dc / c.
     return np.log(value), slope / value[..., None, None]
 
 
@@ -213,7 +222,9 @@ def improving_moves(
         solution = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations)
         via[:, free] = solution.y.reshape(2, -1)
         found, instants = evaluate_move(task, via.copy())
+        # The violation is that of the margins less the reserve: without it, less by as much.
         yield found, solution.violation - reserve
+        # The worst instants of the fine grid join the coarse one.
         time = np.union1d(time, instants)
 
 
@@ -223,8 +234,11 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     problem = task.problem(via, [], time, reserve=BETWEEN, objective=no_objective)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
+    # Infinite beside the ends: a dip may lie there.
     left = np.pad(found.least, 1, constant_values=np.inf)
+    # Local minima of what is left, where it is less than nothing.
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
+    # Integral over time: sum over samples times dt.
     gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
     no_stop, broken = np.empty((0, via.shape[1])), limit if worst > 0 else ""
     return Move(via[None], np.array([task.duration]), gram, max(0.0, worst), broken, no_stop), time[dips]

@@ -111,6 +111,7 @@ def affordable(chain: Chain, x: Array, feet: tuple[str, ...], plan: Plan) -> lis
 def nearest_neighbours(x: Array, groups: list[list[int]]) -> list[int]:
     """Return the rows of ``x`` (P, n) in an order in which neighbours are near; groups stay together, in turn."""
     scaled = x.copy()
+    # Metres and radians in one distance.
     scaled[:, :3] *= _METRE
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
     out: list[int] = []
@@ -134,6 +135,7 @@ def _greedy(apart: Array, group: list[int], first: int | None, before: int | Non
 
 def _shortened(path: list[int], apart: Array, before: int | None) -> list[int]:
     """Return the path with stretches turned round (2-opt) until none helps; ``before`` is where it comes from."""
+    # One row more, of zeros: a place at no distance from anywhere.
     table: NDArray[np.float64] = np.pad(apart, ((0, 1), (0, 1)))
     nowhere = len(apart)  # at distance zero from everything
     ends = [nowhere if before is None else before, *path, nowhere]
@@ -143,6 +145,7 @@ def _shortened(path: list[int], apart: Array, before: int | None) -> list[int]:
         for i in range(1, len(ends) - 1):
             for j in range(i + 1, len(ends) - 1):
                 a, b, c, d = ends[i - 1], ends[i], ends[j], ends[j + 1]
+                # 2-opt: turning b ... c round exchanges a-b and c-d for a-c and b-d.
                 if table[a, c] + table[b, d] < table[a, b] + table[c, d] - 1e-9:
                     ends[i : j + 1] = ends[i : j + 1][::-1]
                     better = True

@@ -154,6 +154,7 @@ class Exciting:
         measure = partial(smooth_condition, sharpness=self.sharpness)
         value, slope = total(self.blocks.weight, self.others + static_grams(up), self.blocks.first, measure=measure)
         by = np.zeros((3, *state.x.shape))
+        # G = sum of 1 - u u': d<S, G> = -2 (S u) du.
         by[0] = upright_slopes(state, -2 * np.einsum("nij,tnj->tni", slope, up)) / self.unit
         ends = state.chain.body.limits
         half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
@@ -217,6 +218,7 @@ def shortfall(limit: Limit) -> Objective:
     def missing(state: State) -> tuple[float, Array]:
         margins, slopes = limit.margins(state), np.zeros((3, *state.x.shape))
         lacks = np.minimum(margins.value / limit.scale, 0.0)
+        # Only what is missing counts: the gradient of a square that begins at zero.
         slopes[0] = 2 * np.einsum("tm,tmn->tn", lacks, margins.slopes[0]) / limit.scale
         return float(np.sum(lacks**2)), slopes
 
@@ -251,9 +253,11 @@ def symmetric(body: Body) -> bool:
         np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation")
     )
     bounds = np.array([[limits.lower, limits.upper], [limits.torque_lower, limits.torque_upper]])
+    # Both bounds of a joint whose sense changes change places: sorted again.
     pairs: list[tuple[Array, Array]] = [
         (np.sort(sense * bounds[:, :, across], axis=1), bounds),
         (FLIP * places[across], places),
+        # An axis of rotation is a pseudovector: -F a in the mirror.
         (-FLIP * axes[across], sense[:, None] * axes),  # of a robot's rolls and yaws, both sides may turn the same way
         (FLIP[:, None] * turns[across] * FLIP, turns),
         (body.sip.mass[other], body.sip.mass),
@@ -286,6 +290,7 @@ def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
 def mirror_posture(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
     """Return the image (n,), on the feet ``there``, of a posture ``x`` (n,) on the feet ``here``."""
     across, sense = _joints([joint.name for joint in chain.body.joints])
+    # Mirror in the sagittal plane: left, and the turns about up and forward, change sign.
     out = np.concatenate([x[:ROOT] * [1, -1, 1, -1, -1, 1], sense * x[ROOT:][across]])
     gap = there.ankle - here.ankle[::-1] * [1, -1, 1]
     out[:2] += gap[list(there.planted), :2].mean(axis=0) if there.planted else 0.0
@@ -439,6 +444,7 @@ class _SameFeet:
     def first_of(cls, pool: list[list[Posture]], worth: float) -> "_SameFeet":
         """Return the postures of these places, the first of each place taken unless it is like one taken before."""
         every = list(dict.fromkeys(chained.from_iterable(pool)))
+        # 1 - u u' of every posture (K, N, 3, 3): sums over postures are Gram matrices.
         grams = np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in every])] * 2)
         like, taken = alike(np.array([p.x for p in every])), list[int]()
         for found in pool:

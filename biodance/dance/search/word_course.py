@@ -370,6 +370,7 @@ class WordSearch:
             yield from (step for step in least if not late(step))
             return
         still = self.information.white(self._still(table)[[step.s for step in found]])
+        # Variance removed per second.
         gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
         first = list(islice(on, _LOOKED_AT))

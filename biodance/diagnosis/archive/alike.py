@@ -81,12 +81,14 @@ def likenesses(sessions: Sequence[SessionLeft]) -> tuple[AlikeSessions, ...]:
     if len(sessions) < _FEWEST + 2 or len(cells) < 8:
         return ()
     size = np.array([[np.log1p(max(one.left[cell], 0.0)) for cell in cells] for one in sessions])
+    # What is usual in a cell is taken off: the median over all sessions.
     pattern = size - np.median(size, axis=0)
     open_ = [i for i, one in enumerate(sessions) if not one.told]
     pairs = [(i, j) for i, j in combinations(open_, 2) if sessions[i].plates & sessions[j].plates]
     if not pairs:
         return ()
     independent = len(cells) / _CELLS_EACH
+    # Fisher's z: atanh(r) has the deviation 1 / sqrt(n - 3); the chance is shared by all pairs.
     needed = float(np.tanh(-ndtri(_CHANCE / len(pairs)) / np.sqrt(independent - 3)))
     alike: dict[int, dict[int, float]] = {}
     for i, j in pairs:

@@ -87,8 +87,10 @@ class Candidates:
             reached, added = np.zeros(less.size), np.empty(own.size)
             for v in reversed(range(own.size)):
                 p = person[v]
+                # (R + r)² - R² = (2 R + r) r.
                 added[v] = own[v] - less[p] * (2 * reached[p] + ones[v]) * ones[v]
                 reached[p] += ones[v]
+            # All visits of a person: sum q - h (sum r)².
             whole = self._persons(own) - (less * reached**2)[self.several]
             out += [_steps(added), own - less[person] * ones**2, whole]
         return np.concatenate(out)
@@ -97,6 +99,7 @@ class Candidates:
         """Return c' P c (M,) of every column, what the model's columns do not hold of it; 0 where they hold all."""
         own = self.squares(known.rows)
         along = self.sums(known.solved)
+        # c'V^-1 c less what the model's columns hold of it (`solved` = V^-1 X).
         left = own - np.einsum("ij,jk,ik->i", along, known.covariance, along)
         return np.where(left > _IN_COLUMNS * own, left, 0.0)
 

@@ -84,6 +84,7 @@ class History:
         first, level = len(self.series.plates), np.full(len(self.series.visits), self.fitted.beta[self._own(plate)])
         for i, one in enumerate(self.changes):
             if one.plate in (plate, ALL):
+                # A step lifts every visit from its own on.
                 level[self.series.visits.index(one.visit) :] += self.fitted.beta[first + i]
         return level
 
@@ -95,6 +96,7 @@ class History:
         weight, first = np.zeros(self.fitted.beta.size), len(self.series.plates)
         weight[self._own(plate)] = 1.0
         weight[[first + i for i, one in enumerate(self.changes) if one.plate in (plate, ALL)]] = 1.0
+        # Variance of a sum of coefficients: w'C w.
         return float(weight @ self.fitted.beta), float(np.sqrt(weight @ self.fitted.covariance @ weight))
 
 
@@ -156,6 +158,7 @@ class Rivals:
         weighted, square = self.known.left(value)
         along = self._along(weighted)
         left = np.maximum(square - along**2, 1e-12)
+        # One degree of freedom goes to the candidate itself.
         return np.asarray(along / np.sqrt(left / (self._degrees - 1)))
 
     def _along(self, weighted: Array) -> Array:
@@ -170,6 +173,7 @@ class Rivals:
             count = min(_AT_ONCE, _DRAWS - drawn, 1 + _NUMBERS // (len(self.possible.every) + self._degrees))
             largest = np.abs(self.studentised(self.known.rows.draw(chance, count))).max(axis=0)
             larger, drawn = larger + int(np.sum(largest >= size)), drawn + count
+        # The archive itself counts as one of the draws: no probability is zero.
         return (1 + larger) / (1 + _DRAWS)
 
 
@@ -218,6 +222,7 @@ def _change(
     others = np.delete(columns, k, axis=1)
     dates = Rivals(possible, Projection(fitted.rows, others), possible.where("step", plate=one.plate))
     fall = dates.effects(series.value[:, None])[:, 0] ** 2
+    # Dates within `_DATE` of the largest fall of twice the log likelihood.
     near = [possible.every[k].at for k in dates.index[fall.max() - fall <= _DATE]]
     first, last = (series.visits[v] for v in (min(near), max(near)))
     free = max(1, np.unique(series.visit).size - columns.shape[1])  # visits that tell how much visits differ

@@ -50,6 +50,7 @@ def pool(value: Array, sd: Array) -> Pooled:
     """Return what estimates ``value`` (k,) with standard errors ``sd`` (k,) share; k >= 1."""
     value, variance = np.asarray(value, float), np.asarray(sd, float) ** 2
     spread2 = _between(value, variance)
+    # Weights of a random-effects mean: own error and what differs between them.
     weight = 1 / (variance + spread2)
     mean = float(weight @ value / weight.sum())
     k = value.size
@@ -60,8 +61,10 @@ def pool(value: Array, sd: Array) -> Pooled:
     else:
         error, quantile = float(np.sqrt(variance[0])), 1.96
         p = float(2 * stdtr(1e9, -abs(mean) / error))
+    # Shrinkage towards the mean: share of the variance that is each one's own.
     trust = spread2 / (spread2 + variance)
     own = mean + trust * (value - mean)
+    # Own error as far as it is trusted, the mean's as far as it is not.
     own_sd = np.sqrt(trust * variance + (1 - trust) ** 2 * error**2)
     half = quantile * error
     return Pooled(mean, error, float(np.sqrt(spread2)), p, (mean - half, mean + half), own, own_sd)
@@ -79,6 +82,7 @@ def _between(value: Array, variance: Array) -> float:
 
     if value.size < 2 or excess(0.0) <= 0:
         return 0.0
+    # The excess falls with the variance between: a bracket of its zero.
     high = float(np.var(value) * value.size + variance.max())
     while excess(high) > 0:
         high *= 4
@@ -195,6 +199,7 @@ def _dummies(own: list[PlateEvidence], bases: Mapping[str, str]) -> tuple[Array,
     kept = []
     for factor, level in levels:
         column = np.array([float(one.conditions.get(factor) == level) for one in own])
+        # A level whose column the others span already cannot be told.
         if np.linalg.matrix_rank(np.column_stack([*columns, column])) > len(columns):
             columns.append(column)
             kept.append((factor, level))
@@ -222,6 +227,7 @@ def _differences(
     """Return (factor, level), value and standard error of every difference that one visit knows."""
     columns, levels = _dummies(own, bases)
     beta, square, free = _left(own, columns)
+    # Scatter of the other visits as a prior of so many degrees of freedom.
     variance = (square + _BORROWED * spread) / (free + _BORROWED)
     error = np.sqrt(variance * np.diag(np.linalg.inv(columns.T @ columns)))
     return [(level, float(beta[i]), float(error[i])) for i, level in enumerate(levels, start=1)]

@@ -84,6 +84,7 @@ class RowCovariance:
     @cached_property
     def ones(self) -> Array:
         """(n,) W^-1 1, where W is V without what persons have in common."""
+        # W^-1 1 = D^-1 1 / (1 + s 1'D^-1 1).
         return np.asarray((1 / (1 + self.visits * self._known))[self.groups.visit] / self.alone)
 
     @cached_property
@@ -96,6 +97,7 @@ class RowCovariance:
     def log_determinant(self) -> float:
         """Logarithm of |V|: a block's determinant is that of what it is made of times 1 + s 1'(...)^-1 1."""
         known = self.groups.by_person @ (self.groups.by_visit @ self.ones)
+        # Matrix determinant lemma, visits first, then persons.
         visits, persons = np.log1p(self.visits * self._known), np.log1p(self.persons * known)
         return float(np.log(self.alone).sum() + visits.sum() + persons.sum())
 
@@ -104,9 +106,11 @@ class RowCovariance:
         groups = self.groups
         out = right / self.alone[:, None]
         less = self._visits_less[:, None] * (groups.by_visit @ out)
+        # D^-1 y - g D^-1 1 (1'D^-1 y).
         out -= less[groups.visit] / self.alone[:, None]
         if self.persons:
             less = self.persons_less[:, None] * (groups.by_person @ (groups.by_visit @ out))
+            # The same once more for persons, with W in place of D.
             out -= less[groups.person[groups.visit]] * self.ones[:, None]
         return np.asarray(out)
 
@@ -114,6 +118,7 @@ class RowCovariance:
         """Return q and r (V, A) of the rows' ``shares`` (n, A) in each visit: c' V^-1 c = sum q - h (sum r)^2 for a
         column c that has these shares in some visits of one person, and zeros elsewhere.
         """
+        # By visit: 1'D^-1 c and c'D^-1 c; the visit's own g takes g (1'D^-1 c)² off.
         white = self.groups.by_visit @ (shares / self.alone[:, None])
         own = self.groups.by_visit @ (shares**2 / self.alone[:, None])
         return own - self._visits_less[:, None] * white**2, self.groups.by_visit @ (shares * self.ones[:, None])
@@ -122,6 +127,7 @@ class RowCovariance:
         """Return ``count`` draws (n, count) from the normal distribution with mean 0 and covariance V."""
         groups = self.groups
         out = np.sqrt(self.alone)[:, None] * chance.standard_normal((self.alone.size, count))
+        # One number per visit has the covariance s 11' in its rows.
         out += (np.sqrt(self.visits) * chance.standard_normal((groups.visits.size, count)))[groups.visit]
         if self.persons:
             shared = np.sqrt(self.persons) * chance.standard_normal((groups.persons.size, count))
@@ -135,6 +141,7 @@ class Projection:
     def __init__(self, rows: RowCovariance, columns: Array) -> None:
         self.rows, self.columns, self.solved = rows, columns, rows.solve(columns)
         known = columns.T @ self.solved
+        # A trace of each own diagonal element: positive definite where columns nearly agree.
         self._factor = cho_factor(known + np.diag(_RIDGE * np.diag(known) + np.finfo(float).tiny), lower=True)
 
     @cached_property
@@ -144,10 +151,12 @@ class Projection:
 
     def fit(self, value: Array) -> Array:
         """Return the coefficients (K, m) of generalised least squares of ``value`` (n, m)."""
+        # beta = (X'V^-1 X)^-1 X'V^-1 y.
         return np.asarray(cho_solve(self._factor, self.solved.T @ value))
 
     def left(self, value: Array) -> tuple[Array, Array]:
         """Return P y (n, m) and y' P y (m,) of ``value`` y (n, m), from what generalised least squares leave of it."""
+        # P y = V^-1 (y - X beta), and y'P y = (y - X beta)'V^-1 (y - X beta).
         rest = value - self.columns @ self.fit(value)
         weighted = self.rows.solve(rest)
         return weighted, np.einsum("ij,ij->j", rest, weighted)
@@ -156,5 +165,6 @@ class Projection:
         """Return minus the restricted log likelihood of ``value`` (n,), up to a constant: half of log |V| +
         log |X' V^-1 X| + y' P y.
         """
+        # log|X'V^-1 X| from the Cholesky factor.
         known = 2 * float(np.log(np.diag(self._factor[0])).sum())
         return (self.rows.log_determinant + known + float(self.left(value[:, None])[1][0])) / 2

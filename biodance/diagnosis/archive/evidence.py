@@ -158,6 +158,7 @@ def _of_standing(
     seconds = float(trial.plates[0].wrench.time[-1] - trial.plates[0].wrench.time[0])
     if unknown and seconds >= _SHORTEST:
         mean = np.sum([plate.wrench.force.mean(axis=0) for plate in on], axis=0)
+        # Mean force = m (v1 - v0) / T: two independent speeds, hence sqrt(2).
         sd = float(np.hypot(_WEIGHS, np.sqrt(2) * weighed * _SWAY_SPEED / min(seconds, _LONGEST)))
         found += [
             PlateEvidence(

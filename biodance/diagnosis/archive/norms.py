@@ -94,6 +94,7 @@ def norms(found: Sequence[SeenValue]) -> tuple[Norm, ...]:
 def _norm(name: str, sessions: Mapping[str, Sequence[SeenValue]]) -> Norm:
     """Return what is usual of one thing: medians of the sessions, pooled."""
     value = np.array([np.median([one.value for one in some]) for some in sessions.values()])
+    # Standard error of the mean of a session.
     known = np.array([np.mean([one.sd for one in some]) / np.sqrt(len(some)) for some in sessions.values()])
     scatter = max(float(np.std(value, ddof=1)), 1e-12)
     shared = pool(value, np.where(np.isfinite(known), known, 0.1 * scatter))

@@ -115,6 +115,7 @@ def _cells(name: str, some: Sequence[PlateEvidence]) -> dict[str, Any]:
     suffix = {"1": "", "m": "_m", "s": "_s", "N": "_n"}[PLATE_QUANTITIES[name].unit]
     if not some:
         return {f"{name}{suffix}": None, f"{name}_sd{suffix}": None, f"{name}_trials": 0}
+    # Weighted mean with 1 / sd²; its variance is the inverse of the sum of the weights.
     weight = np.array([one.sd**-2.0 for one in some])
     mean = float(weight @ np.array([one.value for one in some]) / weight.sum())
     return {f"{name}{suffix}": mean, f"{name}_sd{suffix}": float(weight.sum() ** -0.5), f"{name}_trials": len(some)}

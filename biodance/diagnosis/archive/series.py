@@ -101,6 +101,7 @@ def _scatter(groups: list[list[PlateEvidence]]) -> float:
     for some in groups:
         if len(some) > 1:
             value, sd = np.array([one.value for one in some]), np.array([one.sd for one in some])
+            # A deviation from the mean of n has the variance (n - 1) / n.
             found.append((value - np.average(value, weights=sd**-2)) / sd * np.sqrt(len(some) / (len(some) - 1)))
     each = np.abs(np.concatenate(found))
     return max(1.0, NORMAL_OVER_MEDIAN * float(np.median(each))) if each.size else 1.0
@@ -113,6 +114,7 @@ def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[flo
     value, sd = np.array([one.value for one in some]), scatter * np.array([one.sd for one in some])
     mean, weight = float(np.median(value)), sd**-2
     for _ in range(_ROUNDS):
+        # Huber's weight: falls with 1 / |r| beyond `_FAR`.
         weight = sd**-2 * np.minimum(1.0, _FAR / np.maximum(np.abs(value - mean) / sd, 1e-12))
         mean = float(weight @ value / weight.sum())
     return mean, max(float(weight.sum() ** -0.5), _QUIETEST * PLATE_QUANTITIES[quantity].typical)
@@ -132,6 +134,7 @@ def fit_series(series: Series, columns: Array) -> Fitted:
         return Projection(RowCovariance(groups, alone, variance[0], variance[-1] if again else 0.0), columns)
 
     def cost(log_sd: Array) -> float:
+        # Lognormal prior of every deviation about its typical size.
         return explained(log_sd).restricted(series.value) + float(np.sum(((log_sd - start) / _DOUBT) ** 2) / 2)
 
     best = minimize(cost, start, method="L-BFGS-B", bounds=[(low - 4, low + 8) for low in start]).x

@@ -82,8 +82,10 @@ def plate_places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
     prior = np.diag([_UNKNOWN**-2.0] * (2 * len(plates)) + [1.0] * len(parts))
     weight = sd**-2
     for _ in range(_ROUNDS):
+        # Normal equations with the prior's precision: places nearly free, parts of unit size.
         covariance = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)
         found = covariance @ columns.T @ (weight * value)
+        # Student's weights.
         weight = sd**-2 * (_TAIL + 1) / (_TAIL + ((value - columns @ found) / sd) ** 2)
     error = np.sqrt(np.diag(covariance))
     return {plate: (found[2 * i : 2 * i + 2], error[2 * i : 2 * i + 2]) for i, plate in enumerate(plates)}
@@ -124,5 +126,6 @@ def _mean(quantity: str, own: Sequence[Observation], *, relative: bool) -> list[
         return []
     scale = np.array([one.expected if relative else 1.0 for one in own])
     value = np.array([one.value - one.expected for one in own]) / scale
+    # Precision of the relative value: (scale / sd)².
     weight = (scale / np.array([one.sd for one in own])) ** 2
     return [(quantity, float(weight @ value / weight.sum()), float(weight.sum() ** -0.5))]

@@ -30,7 +30,9 @@ def rightwards(markers: Markers, marker_set: MarkerSet) -> Array:
         (at("right_asis") + at("left_asis")) / 2 - at("mid_psis"),
         *(at(front) - at(back) for front, back in _AHEAD),
     ]
+    # What points ahead votes by its right: ahead x up.
     votes = np.stack([*across, *(np.cross(way, [0.0, 0.0, 1.0]) for way in ahead)]) * [1.0, 1.0, 0.0]
+    # Unit vectors on both sides: every pair of landmarks has one vote, whatever its length.
     return _unit(np.nansum(_unit(votes), axis=0))
 
 

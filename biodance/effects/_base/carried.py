@@ -60,6 +60,8 @@ def carried_by_plates(case: Case) -> Carried | None:
         right = wrench[2] + lacks
         place = _place(wrench) if wrench[2] > _LOADED * need[2] else (plate.centre - middle)[:2]
         if right > 0:
+            # Where all plates' pressure would lie if this plate also carried what lacks, at its
+            # own place: mean by force.
             corrected = (total[2] * _place(total) + lacks * place) / need[2]
             found[plate.name] = float(wrench[2] / right - 1), float((corrected - _place(need)) @ left)
     return Carried(float(total[2] / need[2]), float((_place(total) - _place(need)) @ left), found)
@@ -67,4 +69,5 @@ def carried_by_plates(case: Case) -> Carried | None:
 
 def _place(wrench: Array) -> Array:
     """Return where (2,) m a wrench (6,) presses, in the plane of its point."""
+    # x = -My / Fz, y = Mx / Fz about the point of the wrench.
     return np.array([-wrench[4], wrench[3]]) / wrench[2]

@@ -108,6 +108,7 @@ class Case:
         columns = list(self.marker_columns)
         segment = [self.body.markers.segment[c] for c in columns]
         apart = self.measured_markers - self.poses.points(segment, self.body.markers.position[columns])
+        # R' (measured - model): sum over i of R[t, k, i, j] d[t, k, i].
         local = np.einsum("tkij,tki->tkj", self.poses.rotation[:, segment], apart)
         seen = np.isfinite(local)
         return np.asarray(np.where(seen, local, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
@@ -149,6 +150,7 @@ class Case:
         force times the whole.
         """
         total = self.measured[:, 2]
+        # Below a newton there is no share to speak of: the plates are taken alike.
         safe = np.where(np.abs(total) > 1.0, total, 1.0)
         share = np.where(np.abs(total) > 1.0, plate.wrench.value[:, 2] / safe, 1.0 / len(self.trial.plates))
         value = self.predicted * (np.ones_like(share) if len(self.trial.plates) == 1 else share)[:, None]

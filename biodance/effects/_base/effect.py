@@ -142,6 +142,7 @@ class Effect(Checked):
         about the lab origin.
         """
         steps = 1e-3 * np.diag(self.typical)
+        # Central difference at zero: error of second order in the step.
         return np.stack([(self.added(case, s) - self.added(case, -s)) / (2 * s.max()) for s in steps], axis=2)
 
     def transform(self, case: Case, theta: Array) -> Case:
@@ -243,6 +244,7 @@ class ChannelEffect(Effect, ABC):
 
     def columns(self, case: Case) -> Array:
         """Return what one unit adds to the channel, moved to the lab origin."""
+        # One channel about the plate's centre; a force there has a moment about the lab origin.
         only = self.in_channel(case)[:, None] * np.eye(6)[self.channel]
         return wrench_about_origin(only, self.plate_of(case).centre)[:, :, None]
 

@@ -67,6 +67,7 @@ def _changes(markers: Markers, pairs: Iterable[Pair]) -> Array:
     ways[[0, -1]] = np.nan
     for one, other in ((markers[a], markers[b]) for a, b in pairs):
         straight = np.linalg.norm(np.diff(one, axis=0), axis=1) + np.linalg.norm(np.diff(other, axis=0), axis=1)
+        # Way of both markers under their names less that under exchanged ones: positive where exchange is shorter.
         crossing = np.linalg.norm(other[1:] - one[:-1], axis=1) + np.linalg.norm(one[1:] - other[:-1], axis=1)
         ways[1:-1] += straight - crossing
     return np.where(np.isnan(ways), np.nan, np.where(ways > 0, 1.0, 0.0))

@@ -124,6 +124,7 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
     """
     every = _misfits(markers, np.arange(markers.time.size))
     named = {one: every(one, {}) for one in groups}
+    # A misfit is a sum of squares: n markers at an RMS of `_MISFIT`.
     wrong = [one for one in groups if np.sum(named[one] > len(one.labels) * _MISFIT**2) >= LEAST_EXCHANGED]
     if not wrong:
         return (), ()
@@ -136,6 +137,7 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
             continue
         better, _, gain = _explained(some, groups, pairs)
         if better.sum() >= LEAST_EXCHANGED:
+            # Each exchanged pair must earn what noise alone may give.
             gains[pairs] = float(gain[better].sum() - 2 * len(pairs) * _NOISE**2 * better.sum())
     possible = {}
     for pairs in sorted(gains, key=lambda pairs: -gains[pairs]):
@@ -145,6 +147,7 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
     if not possible:
         return (), ()
     best, *others = possible
+    # Exchanges that contain the best one do not contradict it.
     alone = all(_better(markers, groups, best, other) for other in others if not set(best) <= set(other))
     return (best, possible[best]) if alone else ((), ())
 
@@ -284,6 +287,7 @@ def _uncontradicted(
         worse = set()
         for was, now in zip(before, after, strict=True):
             apart = middle(now.misfit(exchanged, {}, frames)) - middle(was.misfit(markers, {}, frames))
+            # Sums of squares, too: n markers, `_NOISE` each.
             worse |= set(was.labels) if apart > len(was.labels) * _NOISE**2 else set()
         torn = [pair for pair in left if set(pair) & worse]
         if not torn:

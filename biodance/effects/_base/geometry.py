@@ -59,6 +59,7 @@ class Geometry:
 
         def moved(some: Index) -> Array:
             place = np.zeros((some.size, count, 3, count, 3))
+            # (f, count, 3, count, 3): a marker moves by the column of its segment's axes, the others not at all.
             place[:, own, :, own] = np.moveaxis(turn[some], 1, 0)
             return place.reshape(some.size, count, 3, -1)
 
@@ -80,6 +81,7 @@ class Geometry:
             moved.append(carried)
         on = [sensitivity.distal[chain[-1]][:, None, None] for chain in chains(sensitivity.body)]
         posture = sensitivity.follow(np.concatenate(slopes, axis=2))
+        # By the posture that follows, and directly: what hangs on the joint is carried along.
         wrench = self._wrench(self.matter @ posture + np.concatenate(direct, axis=2))
         pairs = list(zip(on, moved, strict=True))
         return Changes(
@@ -106,6 +108,7 @@ class Geometry:
         ``posture`` (F, nv, P).
         """
         few = np.arange(len(self.time))[self._few]
+        # Weights of the time mean: frames are not evenly spaced at the ends.
         lasting = self.seen[few] * np.gradient(self.time)[few, None]
         share = lasting / np.maximum(lasting.sum(axis=0), 1e-12)
         parts = zip(*(np.array_split(one, max(1, few.size // _TOGETHER)) for one in (few, share)), strict=True)
@@ -119,7 +122,9 @@ class Geometry:
         place = (sensitivity.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved
         turns = self.turns[few][:, segment].reshape(frames, 3 * count, -1)
         weight = np.where(sensitivity.weight > 0, sensitivity.weight, 1.0)[few]
+        # `apart` carries the weight; the turning of the segment turns the residual's distance in metres.
         apart = skew(sensitivity.apart[few] / weight[..., None])
+        # Measured less model in segment axes: the segment's turn r changes it by -r x d, the moved model by -p.
         change = -(apart @ (turns @ posture[few]).reshape(wide)) - place
         back = np.swapaxes(sensitivity.pose.rotation[few][:, segment], 2, 3) * share[..., None, None]
         return np.asarray((back @ change).sum(axis=0))
@@ -150,6 +155,7 @@ def _moves(sensitivity: PostureSensitivity, chain: tuple[int, ...]) -> tuple[Arr
     """Return how a joint's origin and what is distal to it move (F, 3, 4) in the four changes of ``joint_changes``."""
     joint, pose = sensitivity.body.joints[chain[0]], sensitivity.pose
     parent = pose.root_rotation if joint.parent < 0 else pose.joint_rotation[:, joint.parent]
+    # parent - child C: what is distal keeps its place in the neutral posture.
     kept = pose.rotation[:, carried_by(sensitivity.body, chain[0])] @ neutral_turn(sensitivity.body, chain[0])
     out = parent @ (joint.translation / max(float(np.linalg.norm(joint.translation)), 1e-9))[:, None]
     return np.concatenate([parent, out], axis=2), np.concatenate([parent - kept, out], axis=2)
@@ -178,6 +184,7 @@ def geometry(
     measured = measured[every]
     seen = np.asarray(np.isfinite(measured).all(axis=2), dtype=float)
     weight = seen * body.markers.weight[list(columns)]
+    # Weighted residual of the tracking, zero where a marker is hidden.
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
     sensitivity = PostureSensitivity(
         body, pose, motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight
@@ -211,6 +218,7 @@ def _frames(count: int, rate: float) -> Index:
 def _by_posture(parts: MovedMatter, place: Array, turn: Array) -> Array:
     """Return P, Q, S (F, 9, nv) per unit of every coordinate."""
     frames = len(place)
+    # dP, dQ, dS through displacements and turns: two matrix products over the segments.
     return np.asarray(parts.by_place.reshape(frames, 9, -1) @ place + parts.by_turn.reshape(frames, 9, -1) @ turn)
 
 
@@ -218,6 +226,7 @@ def _tangent_speed(body: Body, motion: Motion, pose: Poses, every: Index) -> Arr
     """Return the velocity (F, nv) in the lab-frame tangent."""
     v = np.array(motion.v[every])
     for k in range(0, body.n_root, 3):
+        # Root velocities of Pinocchio are in the root's axes: into the lab.
         v[:, k : k + 3] = (pose.root_rotation @ v[:, k : k + 3, None])[..., 0]
     return v
 

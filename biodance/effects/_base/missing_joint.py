@@ -56,6 +56,7 @@ class MissingJoint(Effect, ABC):
         found = _movement(case, self)
         if found is None:
             return np.zeros((case.motion.time.size, 6, 2))
+        # Per radian of the angle that was seen; a spline back to all frames.
         added = make_interp_spline(found.time, found.wrench(case) / max(found.angle, 1e-6), k=5)(case.motion.time)
         return np.repeat(added[:, :, None], 2, axis=2)
 
@@ -70,6 +71,7 @@ class MissingJoint(Effect, ABC):
         taken off (squares of independent movements add up), and NaN for what only the wrench can show.
         """
         found = [(case.motion.time.size, _movement(case, self)) for case in cases]
+        # Mean square over all frames of all cases.
         square = sum(frames * one.own**2 for frames, one in found if one is not None) / sum(
             frames for frames, _ in found
         )
@@ -160,6 +162,7 @@ def _slow(case: Case) -> _Slow:
         assert markers is not None
         usual = motion_filter(case.trial.settings)
         calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, usual)[every])
+        # Below the Nyquist frequency of the thinned frames.
         settings = replace(usual, cutoff=min(usual.cutoff, 0.45 * case.motion.rate / (every.step or 1)))
         stiff = smooth(case.body, time, case.motion.q[every], settings=settings)
         case.memory["slow"] = _Slow(calm, stiff.q, segment_motion(case.body, stiff), settings)
@@ -172,6 +175,7 @@ def _tracked(case: Case, body: Body) -> Movement:
     slow = _slow(case)
     names = {joint.name for joint in case.body.joints}
     new = np.flatnonzero([joint.name not in names for joint in body.joints]) + body.nq - len(body.joints)
+    # New joints start at zero between the known angles; each insertion shifts those behind it.
     guess = np.insert(slow.q, new - np.arange(new.size), 0.0, axis=1)
     time = slow.markers.time
     loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
@@ -202,6 +206,7 @@ def _unplaced(case: Case, body: Body) -> list[int]:
 def _not_following(angles: Array, others: Array) -> Array:
     """Return what of the course of ``angles`` (F, n) is in no proportion to those of ``others`` (F, m)."""
     angles, others = angles - angles.mean(axis=0), others - others.mean(axis=0)
+    # Residual of a regression on the other angles (both about their means).
     return angles - others @ np.linalg.lstsq(others, angles, rcond=None)[0]
 
 
@@ -222,6 +227,7 @@ def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
 def _parameters(case: Case, body: Body) -> Array:
     """Return the parameters in use of the body with more segments: what was cut off keeps the table's."""
     phi = np.array(body.sip.phi)
+    # Identified changes act on the old segments; what was cut off keeps the table's values.
     phi[: case.phi.size] += case.phi - case.body.sip.phi
     return phi
 

@@ -80,15 +80,18 @@ class PostureSensitivity:
         """(F, nv, nv) inverse of the second derivatives of the cost; zero rows and columns for what a limit holds."""
         H = np.empty((len(self.weight), self.body.nv, self.body.nv))
         for some in self._parts():
+            # J'WJ of each frame without the products of all frames in memory at once.
             wide = self.tangent[some] * self.weight[some, :, None, None]
             flat = (len(wide), -1, self.body.nv)
             np.matmul(np.swapaxes(self.tangent[some].reshape(flat), 1, 2), wide.reshape(flat), out=H[some])
         turns = slice(self.body.n_root // 2, None)
+        # The residuals' curvature makes it the exact Hessian of the tracking cost.
         H[:, turns, turns] += self._curvature()
         size = np.maximum(self.weight.sum(axis=1), 1e-3)[:, None] * np.where(
             np.arange(self.body.nv) < self.body.n_root // 2, 1.0, 0.01
         )
         held = self._held()
+        # A held coordinate: row and column zero, one on the diagonal, and zero again in the inverse.
         H[:, held] = H[:, :, held] = 0.0
         diagonal = np.einsum("fii->fi", H)
         diagonal += np.where(held, 1.0, RIDGE * size)
@@ -105,14 +108,18 @@ class PostureSensitivity:
         origin = np.concatenate(
             [np.repeat(self.pose.root_position[:, None], root, axis=1), self.pose.joint_position], axis=1
         )
+        # Sums over what is distal to each turn: of w (p - m), then of w p (p - m)', about the turn's origin.
         pull = distal @ self.apart
         outer = (self.markers[..., :, None] * self.apart[..., None, :]).reshape(*self.apart.shape[:2], 9)
         X = (distal @ outer).reshape(*pull.shape[:2], 3, 3) - origin[..., :, None] * pull[..., None, :]
+        # (X - tr X) a for every turn, then a_i . that for all pairs.
         bent = (X @ self.axes[..., None])[..., 0] - np.einsum("fjii->fj", X)[..., None] * self.axes
         table = self.axes @ np.swapaxes(bent, 1, 2)
         above = np.triu(self._above())
+        # Valid for i above j only: the lower half is the mirror of the upper.
         upper = np.where(above, table, 0.0)
         whole = upper + np.swapaxes(np.where(np.eye(len(above), dtype=bool), 0.0, upper), 1, 2)
+        # Turns of a free root about one point do not commute: the rotation vector has the mean of both orders.
         whole[:, :root, :root] = 0.5 * (table + np.swapaxes(table, 1, 2))[:, :root, :root]
         return whole
 
@@ -132,8 +139,10 @@ class PostureSensitivity:
         """Return (nv,) True where a joint rests against a limit for most of the trial: single frames would only make
         the answer jump.
         """
+        # Gradient of the cost by each angle: J' w (p - m).
         slope = np.einsum("fkiv,fki->fv", self.tangent, self.apart)[:, self.body.n_root :]
         low, high = self.angles <= self.body.limits.lower + AT_LIMIT, self.angles >= self.body.limits.upper - AT_LIMIT
+        # Pushed against: the cost would fall beyond the limit.
         pressed = (low & (slope > 0)) | (high & (slope < 0))
         return np.concatenate([np.zeros(self.body.n_root, dtype=bool), pressed.mean(axis=0) > 0.5])
 
@@ -143,6 +152,7 @@ class PostureSensitivity:
 
     def follow(self, slope: Array) -> Array:
         """Return dq (F, nv, P) of the changes ``slope`` (F, nv, P) of the cost's gradient at fixed posture."""
+        # Implicit function theorem: dq = -H^-1 dg.
         return -self.inverse @ slope
 
     def follow_markers(self) -> Array:
@@ -160,6 +170,7 @@ class PostureSensitivity:
         pushed = np.moveaxis(self.tangent[some] * self.weight[some, :, None, None], 3, 1)
         turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.distal])
         lever = cross(self.axes[some, :, None], self.apart[some, None])  # a' [x] = (a x x)'
+        # (p - m) . (a x dp) = -dp . (a x (p - m)).
         pushed[:, self.body.n_root // 2 :] -= lever * turning[:, :, None]
         return np.asarray(np.einsum("fvki,fkij->fvkj", pushed, turn, optimize=True).reshape(*pushed.shape[:2], -1))
 
@@ -170,8 +181,10 @@ class PostureSensitivity:
         on, root = self.distal[chain[-1]] > 0, self.body.n_root // 2
         pushed = np.swapaxes((self.tangent[:, on] * self.weight[:, on, None, None]).sum(axis=1), 1, 2) @ carried
         pull = skew(self.apart[:, on].sum(axis=1))
+        # x . (a x d) = -a . (x x d) with x the sum of w (p - m): for turns above the joint.
         turns = np.where(self._above()[:, root + chain[0], None], self.axes, 0.0) @ -pull @ carried
         own = [root + j for j in chain]
+        # The joint's own axes move with its centre: only how far distal points move beside it counts.
         turns[:, own] = self.axes[:, own] @ -pull @ (carried - centre)
         pushed[:, root:] += turns
         return np.asarray(pushed)
@@ -202,13 +215,16 @@ def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
         tensor[:, i, j] = tensor[:, j, i] = table[:, column]
     spin_of = move.rotation @ tensor @ np.swapaxes(move.rotation, -1, -2)
     heavy = mass[:, None, None]
+    # Parallel axes from the joint to the centre of mass, in lab axes.
     central = spin_of - heavy * (
         np.sum(arm**2, axis=-1)[..., None, None] * np.eye(3) - arm[..., :, None] * arm[..., None, :]
     )
     spin = (central @ move.angular_velocity[..., None])[..., 0]
     wheel = skew(move.angular_velocity)
     unit = np.broadcast_to(heavy * np.eye(3), central.shape)
+    # Rows P, Q, S per displacement d: m d, m c x d, -2 m c' x d.
     place = np.stack([unit, heavy * skew(move.position + arm), -2 * heavy * skew(speed)], axis=1)
+    # Rows P, Q, S per turn r: 0, I r, -(I w) x r - (w x I - I w x) r.
     turn = np.stack([np.zeros_like(central), central, -skew(spin) - (wheel @ central - central @ wheel)], axis=1)
     return MovedMatter(*(np.moveaxis(part, 2, 3).reshape(len(part), 9, len(table), 3) for part in (place, turn)))
 
@@ -216,6 +232,7 @@ def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
 def centres_of(phi: Array) -> Array:
     """Return the centres of mass (N, 3) m in the segment frames; the origin for a segment without mass."""
     table = phi.reshape(-1, 10)
+    # Infinite divisor: a segment without mass has its centre at the origin.
     return np.asarray(table[:, 1:4] / np.where(table[:, :1] != 0, table[:, :1], np.inf))
 
 
@@ -237,5 +254,6 @@ def _wrench_of(nine: Array, time: Array, wanted: Array, smoothed: LowPass, gravi
     ends = [(order, np.zeros(smooth.shape[1])) for order in (3, 4)]
     spline = make_interp_spline(wanted, smooth, k=_DEGREE, bc_type=(ends, ends))
     first, second = (spline(wanted, nu=order).reshape(len(wanted), 9, -1) for order in (1, 2))
+    # Q'' + S' - P x g, written with g x P.
     moment = second[:, 3:6] + first[:, 6:] + skew(gravity) @ smooth.reshape(first.shape)[:, :3]
     return np.concatenate([second[:, :3], moment], axis=1)

@@ -23,9 +23,11 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     """
     w, (numerators, denominator, rest) = 2 * np.pi * frequency, _filters(rate, frequency, damping)
     place, speed = (
+        # Initial state of a filter at rest under the first acceleration.
         lfilter(b, denominator, acceleration, axis=0, zi=zi[:, None] * acceleration[:1])[0]
         for b, zi in zip(numerators, rest, strict=True)
     )
+    # The equation of motion gives x'' from place and speed, without differentiating.
     return place, -acceleration - w * w * place - 2 * damping * w * speed
 
 
@@ -36,6 +38,7 @@ def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Arra
     """
     w = 2 * np.pi * frequency
     system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
+    # First-order hold: exact for inputs that are linear between samples.
     numerators, denominator = ss2tf(*cont2discrete(system, 1 / rate, method="foh")[:4])
     return numerators, denominator, [lfilter_zi(b, denominator) for b in numerators]
 
@@ -47,6 +50,7 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
     move = case.segments
     arm = move.rotation[:, segment] @ local
     omega, alpha = move.angular_velocity[:, segment], move.angular_acceleration[:, segment]
+    # a + dw x arm + w x (w x arm).
     acceleration = move.acceleration[:, segment] + cross(alpha, arm) + cross(omega, cross(omega, arm))
     return move.position[:, segment] + arm, acceleration
 
@@ -56,4 +60,5 @@ def oscillator_wrench(place: Array, acceleration: Array, moved: tuple[Array, Arr
     (T, 3).
     """
     x, relative = moved
+    # m (a + x'' - g) at c + x less m (a - g) at c, to first order in x.
     return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - gravity)], axis=1)

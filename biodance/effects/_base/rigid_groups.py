@@ -38,6 +38,7 @@ class RigidGroup:
         (a + b)² <= 2 a² + 2 b².
         """
         shape = np.linalg.norm(self.shape[:, None] - self.shape, axis=2)
+        # Both ends of a distance may share the error: (a + b)² <= 2 (a² + b²), hence a half.
         return np.asarray(0.5 * np.max((apart[:, columns][:, :, columns] - shape) ** 2, axis=(1, 2)))
 
     def misfit(self, markers: Markers, other: Mapping[str, str], frames: Index) -> Array:
@@ -49,9 +50,11 @@ class RigidGroup:
         seen = np.isfinite(points).all(axis=(1, 2))
         here = points[seen] - points[seen].mean(axis=1, keepdims=True)
         product = np.einsum("tki,kj->tij", here, self.shape)
+        # Kabsch: the best turn's trace is the sum of the singular values, the last one negative for a mirror image.
         along = np.linalg.svd(product, compute_uv=False)
         along[:, 2] *= np.where(np.linalg.det(product) < 0, -1.0, 1.0)
         found = np.full(len(points), np.nan)
+        # |x|² + |y|² - 2 tr: squares left after the best turn, without forming it.
         found[seen] = np.maximum((here**2).sum(axis=(1, 2)) + (self.shape**2).sum() - 2 * along.sum(axis=1), 0.0)
         return found
 
@@ -113,6 +116,7 @@ def _median_shape(points: Array) -> Array | None:
     if not len(points):
         return None
     points = points[np.unique(np.linspace(0, len(points) - 1, _SOME).astype(int))]
+    # All frames laid on one in the middle, so that medians are of one posture.
     turn, place = rigid_fit(points, np.broadcast_to(points[len(points) // 2], points.shape))
     shape = np.median(np.einsum("tij,tkj->tki", turn, points) + place[:, None], axis=0)
     return np.asarray(shape - shape.mean(axis=0))

@@ -82,7 +82,9 @@ def back_of_hand(markers: Markers, side: str) -> Array:
     elbow, thumb, other, finger = (markers[side + part] for part in _PARTS)
     wrist = (thumb + other) / 2
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Unit vectors: their triple product is the sine of the angle out of the plane of forearm and wrist.
         along, bar, hand = (_unit(vector) for vector in (wrist - elbow, thumb - other, finger - wrist))
+    # The left hand is a mirror image.
     sign = 1.0 if side == "R" else -1.0
     return np.asarray(sign * np.einsum("ti,ti->t", np.cross(along, bar), hand))
 
@@ -91,6 +93,7 @@ def _contradicting(markers: Markers, worn: MarkerSet) -> set[str]:
     """Return the sides whose bar points backwards, else the more backward one of two that are no mirror images."""
     bars = _bars(markers, worn)
     wrong = {side for side, bar in bars.items() if bar[0] < _BACKWARDS} if travels(markers) else set[str]()
+    # A mirrored bar has the same components ahead, outwards, up: cosine between them.
     if bars and bars["L"] @ bars["R"] < _OPPOSITE and not wrong:
         wrong = {min(bars, key=lambda side: float(bars[side][:2].sum()))}
     return wrong

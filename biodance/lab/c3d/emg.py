@@ -105,6 +105,7 @@ def muscle_of(label: str) -> tuple[str, str] | None:
 def _envelope(value: Array, rate: float) -> Array:
     from scipy.signal import butter, sosfiltfilt
 
+    # Lowest value near zero: rectified already, only to be smoothed.
     if abs(value.min()) > _RECTIFIED * np.abs(value).max():
         value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
     return np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))

@@ -75,6 +75,7 @@ def _high(stand: upright.Standing, place: str, label: str) -> float:
 def _cheapest(cost: Array) -> tuple[list[tuple[int, int]], float]:
     """Return (row, column) of the cheapest assignment of ``cost`` (N, P), in which rows may stay, and its sum."""
     some, places = cost.shape
+    # One column more for each row: staying unassigned costs nothing; impossible pairs cost far more.
     whole = np.full((some, places + some), 1e6)
     whole[:, :places] = np.minimum(cost, 1e6)
     np.fill_diagonal(whole[:, places:], 0.0)
@@ -94,10 +95,13 @@ def _template() -> tuple[tuple[str, ...], Array, Array]:
     leg = np.array([one in ("knee", "ankle", "heel", "toe") for one in joint])
     same, ends, across = (np.equal.outer(np.array(one), np.array(one)) for one in (part, joint, side))
     at, sd = (np.array([usual["places"][one][word] for one in part]) for word in ("at", "sd"))
+    # Products of what the places share: same landmark, two ends of a joint, both of a leg, and
+    # one side with the other.
     alike = [
         np.where(same, 1.0, np.where(ends, end, np.where(np.outer(leg, leg), limb, 0.0))) * np.where(across, 1.0, other)
         for end, limb, other in (usual["together"][axis] for axis in ("out", "ahead", "up"))
     ]
+    # Correlation times both standard deviations.
     return places, at, np.array([one * np.outer(sd[:, k], sd[:, k]) for k, one in enumerate(alike)])
 
 
@@ -108,9 +112,11 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
     have = [k for k, place in enumerate(places) if place in known]
     total = np.zeros((len(shares), len(places)))
     for axis, cov in enumerate(covariance):
+        # x is counted outwards on both sides.
         x = shares[:, axis, None] * (sides if axis == 0 else np.ones(len(places)))
         mean, variance = at[:, axis].copy(), np.diag(cov).copy()
         if have:
+            # C_kk + g²: the known ones are glued with an error of their own.
             inverse = np.linalg.inv(cov[np.ix_(have, have)] + upright.bound("glued") ** 2 * np.eye(len(have)))
             off = x[[known[places[k]] for k in have], have] - mean[have]
             off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
@@ -120,6 +126,7 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
             mean += cov[:, have] @ inverse @ off
             variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
             mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)
+        # Squares over the axes add up; no variance below that of the gluing.
         total += (x - mean) ** 2 / np.maximum(variance, upright.bound("glued") ** 2)
     return total
 
@@ -266,6 +273,7 @@ class _PersonLabels:
         """Return (N, P) half the squared distances given ``known`` landmarks; inf for those without usual place."""
         away = np.full(self.words.shape, np.inf)
         rows = {place: self.rows[label] for place, label in known.items()}
+        # -log of a Gaussian density but for constants: half the squared distance.
         away[:, [_AT[place] for place in _template()[0]]] = _squares(self._shares, rows) / 2
         for side, toe in product(SIDES, _TOES[1:]):
             away[:, _AT[f"{side}_{toe}"]] = away[:, _AT[f"{side}_toe"]]

@@ -162,6 +162,7 @@ def _frozen(xyz: Array) -> Mask:
 
 def _breaks_off(steps: Array, start: int, stop: int) -> bool:
     """Return whether ``steps`` (T,) m a frame break off before ``start`` or set in at ``stop`` in full."""
+    # Before the stretch its steps in reverse, behind it in order.
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
         if min(near, far) >= 0 and max(near, far) < steps.size:
             slower_yet = not 0 <= farther < steps.size or steps[far] < steps[farther]
@@ -172,6 +173,7 @@ def _breaks_off(steps: Array, start: int, stop: int) -> bool:
 
 def _travelled(xyz: Array, repeats: Mask, start: int, stop: int) -> bool:
     """Return whether the markers that do not repeat themselves too move from frame ``start`` - 1 on."""
+    # Those of which at most half of the stretch repeats.
     others = repeats[start:stop].mean(axis=0) < 0.5
     with np.errstate(invalid="ignore"):
         away = np.linalg.norm(xyz[start:stop, others] - xyz[start - 1, others], axis=2)
@@ -198,6 +200,7 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
         line = b + (k + 1) / (frames + 1) * (c - b)
         for expected in (line, np.where(np.isnan(way), line, way)):
             least = np.minimum(least, lengths_of(xyz[2 + k : 2 + k + count] - expected))
+    # Straight on from either side: how far it misses the other one.
     forth, back = (
         lengths_of(near + (frames + 1) * (near - far) - other) for near, far, other in ((b, a, c), (c, d, b))
     )
@@ -209,6 +212,7 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
 
 def _limit(step: float) -> float:
     """Return how far (m) a marker must be off its way, for frames every ``step`` s."""
+    # A change of acceleration moves a marker by about a dt².
     return max(_OFF, _FASTER * step**2)
 
 
@@ -218,6 +222,7 @@ def _spikes(path: Array, step: float) -> tuple[Mask, float]:
     while True:
         found = [_off_its_way(path, frames) for frames in range(1, _LONGEST + 1)]
         off = np.array([one for one, _ in found])
+        # Clearest first: how far off beyond what the sides themselves miss.
         clear = np.where(off > _limit(step), off - [missed for _, missed in found], -np.inf)
         if not np.isfinite(clear).any():
             return spiky, farthest
@@ -337,6 +342,7 @@ def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
     ends = []
     for side, edge in ((before, start - 1), (after, stop)):
         offset = time[side] - time[edge]
+        # Parabola about the edge: its first two coefficients are place and slope there.
         powers = np.stack([np.ones(_FLANK), offset, offset**2], axis=1)
         place, slope, _ = np.linalg.lstsq(powers, xyz[side], rcond=None)[0]
         ends.append((time[edge], place, slope))
@@ -353,12 +359,14 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
         return None, "left unseen: fewer than three markers that keep their distance to it were seen throughout"
     span = slice(gap.start - 1, gap.stop + 1)
     others, own = np.stack([markers[label][span] for label in carriers], axis=1), markers[gap.label][span]
+    # Rigid motion of the carriers from one edge to every frame.
     ways = ((rigid_fit(others[edge], others), own[edge]) for edge in (0, -1))
     forward, backward = (turn @ point + place for (turn, place), point in ways)
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
     if closure > _CLOSURE:
         error = f"with an error of {1000 * closure:.0f} mm across the gap"
         return None, f"left unseen: {', '.join(carriers)} predict it {error}"
+    # Linear blend: each prediction is exact at its own edge.
     part = np.linspace(0.0, 1.0, len(own))[:, None]
     blend = (1 - part) * forward + part * backward
     return blend[1:-1], f"filled from {', '.join(carriers)} ({1000 * closure:.0f} mm off across the gap)"
@@ -377,5 +385,6 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
     if len(rigid) < 3:
         return []
     points = np.stack([markers[label][gap.start - 1] for label in rigid])
+    # Second singular value: spread beside the best line; on a line the turn about it is not told.
     from_a_line = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]
     return rigid if from_a_line > _OFF_LINE else []

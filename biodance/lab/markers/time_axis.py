@@ -75,6 +75,7 @@ class TimeAxis:
     @property
     def noise(self) -> float:
         """Factor on the standard deviation of white noise, as drawn noise (fixed seed, known to 1 %) comes out."""
+        # The interpolation is linear: its effect on white noise is a factor.
         drawn = np.random.default_rng(0).normal(size=(self.stamps.size, _DRAWN))
         return float(np.nanstd(self.at(drawn)))
 
@@ -190,8 +191,10 @@ def _paths(xyz: Array) -> Array | None:
     seen = xyz[:, np.isfinite(xyz).all(axis=(0, 2))]
     if seen.shape[1] < 3:
         return None
+    # Each coordinate less its mean.
     columns = seen.reshape(len(seen), -1) - seen.mean(axis=0).ravel()
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    # U S: paths along the principal directions, largest first.
     return np.asarray((left * size)[:, :_COMPONENTS])
 
 
@@ -221,19 +224,24 @@ def _on_grid(stamps: Array, paths: Array) -> tuple[Array, float] | None:
 def _late(instants: Array, paths: Array) -> tuple[Array, Array]:
     """Return how much later (S,) s rows of ``paths`` (S, c) were seen, if smooth, and their squared speed (S,)."""
     rate = 1 / float(np.median(np.diff(instants)))
+    # A smoothing spline passes 1 / (1 + lam w⁴ / rate): half at w = 2 pi SLOW rate.
     stiff = rate / (2 * np.pi * _SLOW * rate) ** 4
     smooth = [make_smoothing_spline(instants, path, lam=stiff) for path in paths.T]
     left = paths - np.stack([one(instants) for one in smooth], axis=1)
     speed = np.stack([one.derivative()(instants) for one in smooth], axis=1)
     square = np.sum(speed**2, axis=1)
+    # path = smooth(t + late), so late = left · speed / speed², damped where the marker hardly moves.
     return np.sum(left * speed, axis=1) / (square + _STILL * square.mean()), square
 
 
 def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | None:
     """Return rate (Hz) and an instant (s) of the grid on which ``instants`` (S,) gather; None as by chance."""
+    # Fast rows tell most of their instants.
     share = weight / weight.sum()
     places = np.rint((instants - instants[0]) / _TICK).astype(int)
+    # Zeros behind: rates are tried more finely than one cycle in the whole recording.
     count = next_fast_len(_FINE * (int(places[-1]) + 1), real=True)
+    # Sum of share exp(-i w t): large where all instants lie on a grid of that rate.
     gathered = np.fft.rfft(np.bincount(places, share), count)
     tried = np.arange(gathered.size) / (count * _TICK)
     legal = np.flatnonzero((tried > 1.5 * rate) & (tried < _HIGHEST))
@@ -243,6 +251,7 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     if chance > _CHANCE:
         return None
     frequency = float(tried[best])
+    # exp(-i w t0): the phase tells the first instant.
     return frequency, float(instants[0] - np.angle(gathered[best]) / (2 * np.pi * frequency))
 
 

@@ -53,6 +53,7 @@ def _movement(markers: Markers) -> float:
 
 def _percentiles(values: Array, *shares: float) -> list[Array]:
     """Return `numpy.nanpercentile` of the numbers along the first axis at ``shares``, 20 times as fast."""
+    # Per column: how many are known, counted from zero.
     last = np.isfinite(values).sum(axis=0) - 1
     places = [share * last for share in shares]
     around = [(np.floor(at).astype(int), np.minimum(np.floor(at).astype(int) + 1, last)) for at in places]
@@ -62,6 +63,7 @@ def _percentiles(values: Array, *shares: float) -> list[Array]:
     found = []
     for at, (below, above) in zip(places, around, strict=True):
         low, high = (np.take_along_axis(ordered, place[None], axis=0)[0] for place in (below, above))
+        # Linear between the two ordered values around the place.
         found.append(low + (at - below) * (high - low))
     return found
 
@@ -119,6 +121,7 @@ def _quietest(markers: Markers) -> Mask:
     step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
     unseen = np.isnan(step)
     cost = np.where(unseen, _UNSEEN, step).sum(axis=1)
+    # Sliding sum: a window of `length` frames holds one step less.
     total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
     start = int(np.argmin(total))
     return np.isin(np.arange(frames), np.arange(start, start + length))
@@ -200,6 +203,7 @@ class Standing:
     def shares(self, labels: Iterable[str]) -> Array:
         """Return (N, 3) of markers, in shares of the stature: right of the middle, ahead of it, above the floor."""
         xyz = np.array([self.at[label] for label in labels]).reshape(-1, 3) - [*self.middle[:2], self.floor]
+        # Into the person's axes, then over the stature.
         return np.asarray(xyz @ np.stack([self.right, self.ahead, [0.0, 0.0, 1.0]]).T / self.stature)
 
     def misfit(self, place: str, label: str) -> float:
@@ -258,6 +262,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     straight = [pairs[part] for part in _STRAIGHT if part in pairs] or list(pairs.values())
     right = np.sum(straight, axis=0) * [1.0, 1.0, 0.0]
     right = right / max(float(np.linalg.norm(right)), 1e-9)
+    # Up x right is ahead.
     forward = np.cross([0.0, 0.0, 1.0], right)
     if np.mean([step @ forward > 0 for step in ahead]) < 0.5:
         return (
@@ -282,6 +287,7 @@ def _middle(known: Mapping[str, Array], pairs: Iterable[str], forward: Array, st
     ankles, spines = ([known[place] for s in SIDES if (place := f"{s}_{part}") in known] for part in _ABOVE)
     ahead_of_ankles = usual_standing()["places"]["asis"]["at"][1] * stature * forward
     above = np.mean(ankles, axis=0) if len(ankles) == 2 else np.mean(spines or [middle], axis=0) - ahead_of_ankles
+    # Only along the way ahead: the middle between the sides stays.
     return np.asarray(middle + (above - middle) @ forward * forward)
 
 
@@ -303,6 +309,7 @@ def standing_by_points(at: Mapping[str, Array]) -> Standing | None:
 def mirror_images(stand: Standing) -> list[tuple[str, str]]:
     """Return the pairs of labels (right, left) of which each lies nearest to the mirror image of the other."""
     labels, xyz = list(stand.at), np.array(list(stand.at.values()))
+    # Signed distance from the plane between the sides.
     out = (xyz - stand.middle) @ stand.right
     away = _mirrored(xyz, stand.right, float(stand.middle @ stand.right))
     nearest = away.argmin(axis=1)
@@ -323,6 +330,7 @@ def _plane_between(xyz: Array) -> tuple[Array, float] | None:
     for i, j in zip(first[level], second[level], strict=True):
         axis = step[i, j] * [1.0, 1.0, 0.0] / flat[i, j]
         offset = float((xyz[i] + xyz[j]) @ axis / 2)
+        # Full score for a marker near its mirror image, none from one and a half times the bound.
         here = float(np.clip(1.5 - _mirrored(xyz, axis, offset).min(axis=1) / bound("paired_m"), 0.0, 1.0).sum())
         if here > best:
             best, plane = here, (axis, offset)
@@ -335,6 +343,7 @@ def _plane_between(xyz: Array) -> tuple[Array, float] | None:
         return plane
     # The plane in the middle of all pairs, not of the one that it was found by.
     other = away.argmin(axis=1)[one]
+    # Vectors from each to its image all lie across the body: their sum is the mean direction.
     across = (xyz[one] - xyz[other]).sum(axis=0) * [1.0, 1.0, 0.0]
     across = across / np.linalg.norm(across)
     return across, float(np.median((xyz[one] + xyz[other]) @ across / 2))
@@ -342,6 +351,7 @@ def _plane_between(xyz: Array) -> tuple[Array, float] | None:
 
 def _mirrored(xyz: Array, axis: Array, offset: float) -> Array:
     """Return (N, N) m from the mirror image of every marker to every marker."""
+    # Reflection: x - 2 (x n - d) n.
     image = xyz - 2 * (xyz @ axis - offset)[:, None] * axis
     away: Array = np.linalg.norm(image[:, None] - xyz[None], axis=2)
     return away
@@ -375,6 +385,7 @@ def _misfit(shares: Array, origin: Array) -> Array:
         usual = usual_standing()["places"][part]
         here = (side * shares[:, 0], shares[:, 1] - origin, shares[:, 2])
         steps = [((x - at) / sd) ** 2 for x, at, sd in zip(here, usual["at"], usual["sd"], strict=True)]
+        # Nearest marker to the landmark (axis 1), for every origin (axis 0).
         found: Array = (steps[0] + steps[1] + steps[2]).min(axis=1)
         return found
 
@@ -382,6 +393,7 @@ def _misfit(shares: Array, origin: Array) -> Array:
     behind = np.minimum(nearest("psis", 1.0), nearest("mid_psis", 1.0))
     trunk = shares[np.abs(shares[:, 0]) < 0.12]
     over = max(float(trunk[:, 2].max(initial=0.0)) - 1.03, 0.0) / 0.02
+    # Each bounded: one landmark that is missing does not decide.
     return np.asarray(np.minimum([*near, behind], 2 * bound("near")).sum(axis=0) + over**2)
 
 
@@ -428,6 +440,7 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
     for up in (
         sign * np.eye(3)[k] for k in np.flatnonzero(extent > bound("tall") * extent.max()) for sign in (1.0, -1.0)
     ):
+        # Any axis across: a right-handed frame whose third axis points up.
         first = np.roll(np.abs(up), 1)
         turned = np.stack([first, np.cross(up, first), up])
         if standing_by_points({label: turned @ point for label, point in at.items()}) is not None:

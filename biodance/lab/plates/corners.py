@@ -83,6 +83,7 @@ def plate_axes(corners: Array) -> Array:
     on most plates).
     """
     x, y = _along_sides(corners)
+    # Polar factor U V' of the two directions: the nearest orthonormal pair, both turned alike.
     u, _, v = np.linalg.svd(np.column_stack([x / np.linalg.norm(x), y / np.linalg.norm(y)]), full_matrices=False)
     x, y = (u @ v).T
     return np.column_stack([x, y, np.cross(x, y)])
@@ -96,6 +97,7 @@ def _along_sides(corners: Array) -> Array:
 
 def half_sides(corners: Array) -> Array:
     """Return half the side lengths (2,) m along the plate's x and y."""
+    # Twice the mean side, and half of that: a quarter.
     return np.linalg.norm(_along_sides(corners), axis=1) / 4
 
 
@@ -251,6 +253,7 @@ def _placed(plate: Plate, corners: Array) -> Plate:
         return replace(plate, corners=corners, placed=True)
     turn = plate_axes(corners) @ plate_axes(plate.corners).T
     local = wrench_about_point(plate.wrench.value, plate.centre)
+    # Both vectors turn about the plate's own centre.
     turned = np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T])
     wrench = Wrench(plate.wrench.time, wrench_about_origin(turned, corners.mean(axis=0)))
     return replace(plate, corners=corners, wrench=wrench, zero=turn @ plate.zero)

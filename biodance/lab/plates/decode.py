@@ -158,7 +158,9 @@ def decode_plates(
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
     if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
         return done, lost, ()
+    # A scale of zero, or none, cannot be undone.
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
+    # Undoes (stored - offset) scale.
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
     plain, lost_plain = _decode_each(stored, plates, metres, turn)
     whole = _weight_share(plain, mass)
@@ -220,6 +222,7 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
     """Return the reading of one plate; TrialRefused where no sample is known."""
 
     def in_si(samples: Array) -> Array:
+        # Calibration @ channels, sample by sample as rows.
         output = samples if plate.calibration is None else samples @ plate.calibration.T
         return output * plate.factors
 
@@ -235,6 +238,7 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
         if plate.type == 1:  # where an empty plate is pressed has no zero
             offsets = np.where([kind == "L" for kind in CONTENT[1]], 0.0, offsets)
     sensor = sensor_wrench(plate.type, in_si(channels - offsets), place.origin)
+    # What is taken off, as a wrench: the forces of the empty plate.
     empty = sensor_wrench(plate.type, in_si(offsets[None]), place.origin)[0, :3]
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
@@ -255,6 +259,7 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask,
             f"{where}, and no sample of the plate is whole. Check the channel in the recording software."
         )
     whole = np.flatnonzero(known)
+    # Middles between known samples are the borders of their neighbourhoods.
     nearest = np.searchsorted((whole[1:] + whole[:-1]) / 2, np.arange(known.size))
     said = f"{int((~known).sum())} of {known.size} samples are unknown, the first: {where}; they are masked."
     return channels[whole[nearest]], known, (said,)
@@ -319,6 +324,7 @@ def _longest_unloaded(vertical: Array, rate: float) -> tuple[int, int] | None:
     for end in (means.min(), means.max()):
         near = means[np.abs(means - end) <= _NEAR]
         middle = float(np.median(near))
+        # 1.4826 times the median distance from the median: the standard deviation of a Gaussian, outliers or not.
         spread = 1.4826 * float(np.median(np.abs(near - middle)))
         for start, stop in runs(np.abs(means - middle) <= max(_FLAT, 4 * spread)):
             inner = slice(start + 1, stop - 1)
@@ -326,6 +332,7 @@ def _longest_unloaded(vertical: Array, rate: float) -> tuple[int, int] | None:
                 continue
             level, length = float(means[inner].mean()), (stop - start - 2) * size / rate
             small = abs(level) <= _SMALL
+            # Standard deviation of a block mean of white noise, and half as much more.
             noise = 1.5 * float(vertical[(start + 1) * size : (stop - 1) * size].std()) / np.sqrt(size)
             quiet = means[inner].std() <= (_FLAT if small else max(_DEAD, noise)) and length >= (
                 _SHORTEST if small else _LONG
@@ -346,6 +353,7 @@ def is_unloaded(level: float, vertical: Array) -> bool:
         return level <= low + _NEAR or level >= high - _NEAR
     if high - low < 5 * _NEAR:
         return False
+    # The offset, positive the way in which the load goes.
     load = level if level <= low + _NEAR else -level
     at_an_end = level <= low + _NEAR or level >= high - _NEAR
     return at_an_end and -(high - low) <= load <= LARGEST_SHARE * (high - low)
@@ -382,17 +390,21 @@ def sensor_wrench(kind: int, signals: Array, origin: Array) -> Array:
     """
     if kind == 1:
         fx, fy, fz, x, y, free = signals.T
+        # The point of an empty plate is noise.
         x, y = np.where(np.maximum(np.abs(x), np.abs(y)) > FARTHEST_PRESSURE, 0.0, (x, y))
+        # p x F for p = (x, y, 0).
         return np.column_stack([fx, fy, fz, y * fz, -(x * fz), free + (x * fy - y * fx)])
     if kind not in FOUR_SENSORS:
         return signals
     if kind == 6:
+        # (corner, component, sample) to (component, corner, sample).
         x, y, (z1, z2, z3, z4) = signals.T.reshape(4, 3, -1).swapaxes(0, 1)
         x12, x34, y14, y23 = x[0] + x[1], x[2] + x[3], y[0] + y[3], y[1] + y[2]
     else:
         x12, x34, y14, y23, z1, z2, z3, z4 = signals[:, :8].T
     a, b = np.abs(origin[:2])
     about_x, about_y = b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4)
+    # x F_y - y F_x, sensor by sensor.
     about_z = b * (x34 - x12) + a * (y14 - y23)
     return np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4, about_x, about_y, about_z], axis=1)
 
@@ -407,6 +419,7 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
     means, size = block_means(wrench[:, 2], rate, length=_CONTACT)
     threshold = max(TOUCH_FORCE, _LOADED * float(np.abs(means).max()))
     lasting = np.repeat(np.abs(means) >= threshold, size)
+    # The last block is not whole: as the one before.
     lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
     return lasting & (np.abs(wrench[:, 2]) >= threshold)
 
@@ -414,6 +427,7 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
 def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
     """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
     total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
+    # Somebody stands there, at a share of the largest total.
     loaded = total >= _SOMEBODY_ON * total.max()
     return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
 

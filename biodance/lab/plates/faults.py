@@ -62,6 +62,7 @@ class PlateFault:
     def done(self, plate: Plate, place: str, size: float) -> Plate:
         """Return what a sound ``plate`` would have recorded with the fault."""
         back = wrench_shift(-plate.centre)
+        # To the centre, the fault there, and back about the lab's origin.
         mixing = back @ self.mixing(place, size) @ wrench_shift(plate.centre)
         value = plate.wrench.value @ mixing.T + size * back @ self.zero(place)
         value.setflags(write=False)  # the record keeps it without a copy
@@ -89,6 +90,7 @@ class _Position(_AtAxis):
     """The file puts the plate ``size`` m along an axis beside where it is: M = shift x F."""
 
     def slope(self, place: str) -> Array:
+        # Block (moment, force): shift x F.
         return np.asarray(np.kron([[0.0, 0.0], [1.0, 0.0]], skew(_unit(place))), dtype=float)
 
     def corners(self, plate: Plate, place: str, size: float) -> Array:
@@ -99,6 +101,7 @@ class _Rotation(_AtAxis):
     """What is recorded is turned by ``size`` rad about an axis through the plate's centre, as its corners are."""
 
     def slope(self, place: str) -> Array:
+        # Turned by a small angle both vectors change by angle e x themselves.
         return np.asarray(np.kron(np.eye(2), skew(_unit(place))), dtype=float)
 
     def mixing(self, place: str, size: float) -> Array:
@@ -115,9 +118,11 @@ class _Gain(PlateFault):
         return np.diag(_channel(place))
 
     def inverse(self, size: float) -> float:
+        # (1 + s)(1 - s / (1 + s)) = 1.
         return -size / (1 + size)
 
     def joined(self, first: float, second: float) -> float:
+        # Factors multiply: the second was found behind the first.
         return (1 + first) * (1 + second) - 1
 
 
@@ -130,6 +135,7 @@ class _Crosstalk(PlateFault):
 
     def slope(self, place: str) -> Array:
         first, _, second = place.partition("->")
+        # Row of the second, column of the first channel; its square is zero, so -size undoes size exactly.
         return np.outer(_channel(second), _channel(first))
 
 

@@ -205,6 +205,7 @@ def plate_parameters(
     if told.corners is None:
         corners = _of_plate(group, "CORNERS", (3, 4), number).T
     else:
+        # v @ R is R'v: from the lab to the file's axes, then into its unit.
         corners = told.corners @ (np.eye(3) if turn is None else turn) / metres
     if told.origin is None:
         origin = _of_plate(group, "ORIGIN", (3,), number) if described else np.zeros(3)
@@ -284,6 +285,7 @@ def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | No
             f"calibration matrix or as TYPE 2."
         )
     matrix = _of_plate(group, "CAL_MATRIX", shape, number)
+    # Read by columns, as C3D stores them; written by rows it is the transpose.
     matrix = (matrix.T if by_row and shape[0] == shape[1] else matrix)[:rows, :columns]
     if not matrix.any(axis=1).all():
         raise TrialRefused(
@@ -301,6 +303,7 @@ def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
     block = stored[12 * (number - 1) : 12 * number]
     if not np.isfinite(block).all() or not block.any():
         return None
+    # Two rows first: one for x, one for y.
     by_term = _numbers(group, "FPCOPPOLY", keep=True).shape[0] == 2
     return block.reshape(2, 6, order="F") if by_term else block.reshape(6, 2, order="F").T
 
@@ -328,6 +331,7 @@ def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], numbe
         raise TrialRefused(
             f"FORCE_PLATFORM:{name} holds a value that is not a number. Correct the file or export it again."
         )
+    # C3D stores the first index fastest.
     return block.reshape(shape, order="F")
 
 

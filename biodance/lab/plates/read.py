@@ -63,6 +63,7 @@ def _borne_elsewhere(reading: PlateReading, others: Sequence[PlateReading], mark
 def _feet_on(reading: PlateReading, markers: Markers) -> bool:
     """Return whether a marker as low as a standing foot's is ever over the plate, or no more than 0.05 m beside it."""
     centre = reading.corners.mean(axis=0)
+    # Component along each axis of the plate.
     x, y, _ = (reading.axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
     low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= FOOT_HEIGHT
     half = reading.half + _AROUND
@@ -102,6 +103,7 @@ def _course(reading: PlateReading, length: float) -> tuple[float, float, float]:
     sensor = reading.sensor[reading.known, 2:5]
     size = min(max(1, round(length * reading.rate)), len(sensor))
     count = len(sensor) // size
+    # Means over blocks (count, size, 3), so that noise averages out.
     means = sensor[: count * size].reshape(count, size, 3).mean(axis=1)
     level, (spread, *wanders) = float(means[:, 0].mean()), means.std(axis=0)
     return level, float(spread), float(max(wanders))
@@ -133,6 +135,7 @@ def without_padding(
 def _padded_samples(raw: RawC3d, markers: Markers | None) -> Mask:
     """Return (S,) True at the ends where all channels repeat one sample though the markers go on."""
     padded = np.zeros(len(raw.analog), dtype=bool)
+    # Channels that never change say nothing of padding.
     live = raw.analog[:, (raw.analog != raw.analog[:1]).any(axis=0)] if len(raw.analog) else raw.analog
     if not live.size:
         return padded

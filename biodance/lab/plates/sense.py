@@ -53,11 +53,13 @@ def _surface_wrench(reading: PlateReading) -> tuple[Array, _Said]:
     wrench = wrench_about_point(reading.sensor, below)
     if reading.plate.polynomial is None:
         return wrench, (said,)
+    # Polynomial in mm.
     point = 1000 * zero_moment_point(wrench, threshold=COP_FORCE)[:, :2]
     point[np.abs(point) > 1000 * FARTHEST_PRESSURE] = np.nan
     error = np.zeros((len(point), 3))
     for i, p in enumerate(reading.plate.polynomial):
         own, other = point[:, i], point[:, 1 - i] ** 2
+        # Odd in the coordinate itself, even in the other one.
         error[:, i] = (p[0] * other**2 + p[1] * other + p[2]) * own**3 + (p[3] * other**2 + p[4] * other + p[5]) * own
     # a force that acts at p - d has about the centre the moment that it has about d when it acts at p
     corrected = wrench_about_point(wrench, np.nan_to_num(error / 1000))
@@ -185,6 +187,7 @@ def gravity_sign(pressed: Array, axes: Array) -> int:
     ``pressed`` (L, 6) N, N·m are the loaded samples in plate axes, ``axes`` (3, 3) is lab_R_plate: the sign of the sum
     of F along the lab's z.
     """
+    # Row z of lab_R_plate: the vertical part of every force.
     return int(np.sign((pressed[:, :3] @ axes[2]).sum()))
 
 
@@ -204,16 +207,20 @@ def sway_sign(force: Array, point: Array, rate: float) -> int:
     if part is None:
         return 0
     seconds = len(force[part]) / rate
+    # Least correlation that is no chance: the band holds 2 B T independent samples.
     least, signs = max(_SWAY_CORRELATION, 3 / np.sqrt(2 * (_SWAY_BAND[1] - _SWAY_BAND[0]) * seconds)), []
     for axis in (0, 1):
         shear, cop = _band(force[part, axis], rate), _band(point[part, axis], rate)
         power = float(cop @ cop)
         if power <= 0 or not shear.any():
             return 0
+        # Both have no mean: a normalised scalar product.
         correlation = float(shear @ cop / np.sqrt(power * float(shear @ shear)))
+        # Regression of the shear on the pressure, per weight: about 1 / h.
         slope = abs(float(shear @ cop)) / power / abs(float(force[part, 2].mean()))
         if abs(correlation) < least or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
             return 0
+        # The shear on the person is opposite to the pressure: a negative correlation is the reaction.
         signs.append(-np.sign(correlation))
     return int(signs[0]) if signs[0] == signs[1] else 0
 
@@ -234,6 +241,7 @@ def _standing(vertical: Array, rate: float) -> slice | None:
 def _band(values: Array, rate: float) -> Array:
     """Return the part of a signal between 0.5 and 5 Hz, without its straight line and faded in and out."""
     along = np.linspace(-1, 1, values.size)
+    # Regression line off: `along` has no mean, so slope and mean are independent.
     values = values - values.mean() - along * (along @ values) / (along @ along)
     spectrum = np.fft.rfft(values * np.hanning(values.size))
     frequency = np.fft.rfftfreq(values.size, 1 / rate)
@@ -248,6 +256,7 @@ def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array
     (determinant -1) turn moments, which are axial vectors, the other way round than forces.
     """
     force = sign * wrench[:, :3] @ axes.T
+    # An axial vector under a mirror: det R = -1 turns it once more.
     moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
     return wrench_about_origin(np.hstack([force, moment]), centre)
 
@@ -266,6 +275,7 @@ def sense_plates(
     votes = [sign * z for sign, z in zip(signs, up, strict=True)]
     plates, warnings, mended = [], [], False
     for reading, sign, z in zip(readings, signs, up, strict=True):
+        # Sign of most others along the same direction, for this plate's z.
         otherwise = int(np.sign(sum(votes))) * z or 1
         alone = bool(sign) and sum(map(abs, signs)) == 1
         odd = bool(sign) and -sign * z in votes
@@ -319,6 +329,7 @@ def _in_lab(
         reading, angle, checked, doubt = _under_feet(reading, time, markers)
         fz_alone = odd and angle == 180
         if fz_alone:
+            # The half turn about z has reversed Fx, Fy, Mx and My; Mz is left to reverse.
             wrench = wrench * np.array([1, 1, 1, 1, 1, -1])
             checked, doubt = _FZ_ALONE, f"{_FZ_ALONE} Check its cabling."
         doubts += [doubt] * bool(doubt)
@@ -326,6 +337,7 @@ def _in_lab(
     value = wrench_in_lab(wrench, reading.axes, sign or otherwise, reading.corners.mean(axis=0))
     value[~reading.known] = np.nan
     value.setflags(write=False)  # the record keeps it without a copy
+    # R times the force in plate axes.
     zero = (sign or otherwise) * reading.axes @ reading.empty
     plate, steps = reading.plate, reading.decisions
     where = (plate.name, plate.type, reading.corners, Wrench(time, value))
@@ -368,6 +380,7 @@ def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers
         return reading, ()
     other = replace(reading, vector=reading.vector * _HALF_TURN)
     written, turned = (_distance(one, time, markers) for one in (reading, other))
+    # Beside the feet as written, under them when turned.
     if written is None or turned is None or written <= _NOT_UNDER or turned > _UNDER_THE_FOOT:
         return reading, ()
     said = (
@@ -405,6 +418,7 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
     if distance <= _NOT_UNDER:
         near = f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show."
         return reading, 0, near, ""
+    # Other corner as the first: the axes turned by quarters about z.
     turns = {90 * k: replace(reading, axes=reading.axes @ turn) for k, turn in enumerate(_QUARTER_TURNS, start=1)}
     found = {angle: _distance(turned, time, markers) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= _UNDER_THE_FOOT]
@@ -443,6 +457,7 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
 def _distances_between(points: Array, feet: Array) -> Array:
     """Return (F,) m from points (F, 2) to the nearest segment between two of ``feet`` (F, n, 2); inf without any."""
     i, j = np.triu_indices(feet.shape[1], 1)
+    # From the point to each marker; the distance is that from the origin.
     away = feet - points[:, None]
     with np.errstate(invalid="ignore"):  # feet that are not there give NaN
         x, y = away[:, i, 0], away[:, i, 1]

@@ -78,6 +78,7 @@ def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
         np.concatenate([np.linalg.norm(values[:, list(group[part])], axis=1) for group in groups])
         for part in (slice(3, 5), slice(0, 3))
     )
+    # Where at least a tenth of the largest force acts.
     loaded = force > 0.1 * np.nanmax(force, initial=0.0)
     return float(np.nanmedian(moment[loaded] / force[loaded])) if loaded.any() else 0.0
 
@@ -138,6 +139,7 @@ def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
 def _at_corners(number: int, load: Load, corners: Array, time: Array) -> Plate:
     """Return the plate whose ``corners`` (4, 3) m are told: wrench along its own axes, about its centre."""
     axes, centre = plate_axes(corners), corners.mean(axis=0)
+    # R v of every row: plate axes to the lab.
     turned = np.hstack([load.value[:, :3] @ axes.T, load.value[:, 3:] @ axes.T])
     turned, zero, zeroed = _zeroed(turned, time)
     signed, said = _upright(turned)
@@ -165,10 +167,13 @@ def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     if any(end is None for foot in ends for end in foot):
         return None
     places = np.array(ends, dtype=float)  # (side, end, T, 3)
+    # Fifth percentile: single frames below the ground do not count.
     lowest = np.nanpercentile(places[..., 2], 5, axis=2, keepdims=True)
     down = (places[..., 2] < lowest + _FLAT).all(axis=1)  # (side, T)
+    # Between heel and toe, at the share where people press.
     pressed = (1 - _PRESSED) * places[:, 0, :, :2] + _PRESSED * places[:, 1, :, :2]
     foot = np.where(down[..., None], pressed, np.nan)
+    # Both down: between them; one down: under it.
     middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
     both = down.all(axis=0)
     height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
@@ -180,6 +185,7 @@ def _pressure(value: Array) -> Array:
     """Return the centre of pressure (T, 2) m about the point of the moments; NaN without load."""
     vertical = value[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
+        # x = -My / Fz, y = Mx / Fz.
         cop = np.stack([-value[:, 4] / vertical, value[:, 3] / vertical], axis=1)
     return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
 
@@ -190,6 +196,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     zeroed = [_zeroed(value, time) for value in turned]
     signed = [_upright(value) for value, _, _ in zeroed]
     total = np.sum([value for value, _ in signed], axis=0)
+    # The place is told by the total: which foot is on which plate does not matter.
     shift = None if feet is None else _shift(total, time, feet)
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
         return PlatesRead(warnings=(_lacking([n for n, _ in free], feet, shift),))

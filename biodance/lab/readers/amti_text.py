@@ -202,6 +202,7 @@ def amti_plate(
     wrench = wrench_about_point(channels, below)
     sign = 1 if gravity_sign(wrench[loaded_samples(wrench, rate)], PLATE_UPRIGHT) > 0 else -1
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(size) / 2
+    # Plate axes to the lab.
     corners = np.column_stack([half, np.zeros(4)]) @ PLATE_UPRIGHT.T + centre
     directions = (
         "Lab frame = plate frame turned about x: x stays, y and z (down) are reversed, so that z points up; origin at "

@@ -239,6 +239,7 @@ def _measurements(main: Any) -> dict[str, float]:
     """Return the subject's mass (kg) and height (m) from the header where they make sense."""
     mass, height = float(main["weight"]), float(main["height"])
     if not int(main["metric"]):
+        # Weight in pounds to N, over g.
         mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
     elif height > 3:
         height /= 100

@@ -38,10 +38,12 @@ def balls(body: Body) -> Balls:
         if not (in_a_row and one.segment == two.segment == NO_SEGMENT):
             continue
         axes = np.array([joint.axis for joint in (one, two, three)])
+        # Meeting in one point, no rotation between, and square to each other: a ball joint.
         turns = np.array([two.rotation, three.rotation, axes @ axes.T])
         apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
         if max(apart) < _SAME:
             first.append(i)
+            # +1 or -1: axes of the left side are mirrored, and turn the other way about each.
             sign.append(np.linalg.det(axes))
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
 
@@ -59,6 +61,7 @@ def _unit(quaternion: Array) -> Array:
 def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
     """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B)."""
     x, y, z, w = quaternion
+    # Cardan angles x, y, z of R = R1 R2 R3: sin of the second is R[0, 2] = 2 (x z + y w).
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
     one = np.stack(
         [
@@ -68,6 +71,7 @@ def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
         ]
     )
     first = _turned_near(sign * one, near)
+    # (pi + a, pi - b, pi + c) is the same rotation.
     other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), near)
     away, other_away = (np.abs(angles - near).sum(axis=0) for angles in (first, other))
     return np.where(other_away < away, other, first)
@@ -120,9 +124,11 @@ class Chart:
         """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames, signs and turns continued."""
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
+        # Half angles; mirrored axes turn by the negative angle in their own, right-handed triad.
         half = 0.5 * self.joints.sign * self.joints.angles_of(angles)
         (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
         c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
+        # Product of the three quaternions about x, y, z, written out.
         ball = continued(np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23]))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 

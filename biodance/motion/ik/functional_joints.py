@@ -112,7 +112,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
         postures = Markers(postures.names, postures.time[shows], postures.xyz[shows])
         scaling = replace(scaling, notes=(*scaling.notes, _not_shown(shows)))
         fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q[shows], noise=skin)
+    # Number of postures per independent one: neighbours in time err alike.
     alike = max(1.0, postures.time.size * _ALIKE / seconds)
+    # Distance per axis (a third of the square) or skin, whichever is more; sqrt(alike) for dependent postures.
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
     shown = excited(scaling.centres, start.theta, start.information)
@@ -198,6 +200,7 @@ def _told(
     refused: Mapping[str, float],
 ) -> _FunctionalJoints:
     """Return the result with its notes: markers ``spared``, and how far ``refused`` joints would go."""
+    # Laplace: inverse of the information at the minimum.
     covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
@@ -208,6 +211,7 @@ def _told(
     def error(joint: str) -> JointError:
         marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
         reach = _reach(joint, found.theta, covariance) if joint in wrong else (0.0, 0.0)
+        # RMS over the three axes, and what no fixed point can give, in quadrature.
         centre = float(np.hypot(np.sqrt(np.mean(deviation[own_centre(joint)] ** 2)), fixed_point(joint)))
         return JointError(joint, centre, axis.get(joint, 0.0), joint in wrong, far, marker, *reach)
 
@@ -275,12 +279,15 @@ def _reach(joint: str, theta: Array, covariance: Array) -> tuple[float, float]:
     (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off.
     """
     own, before = own_centre(joint), centre_sd(joint, contradicted=True)
+    # Precision of the posterior less that of its prior: what the movement tells.
     told = np.linalg.inv(covariance[own, own])
     shown, axes = np.linalg.eigh(told - np.eye(3) / before**2)
     spread = 1 / (np.maximum(shown, 0.0) + max(FAULTY * MISSED, before) ** -2)
     wide = axes @ np.diag(spread) @ axes.T
+    # told @ theta is movement's information times its estimate, as the prior's mean is zero.
     shift = wide @ told @ theta[own]
     far = float(np.linalg.norm(shift))
+    # Standard deviation along the shift: s' C s / |s|².
     return far, float(np.hypot(np.sqrt(shift @ wide @ shift) / far, fixed_point(joint)))
 
 
@@ -344,6 +351,7 @@ class _Followed:
         at = [self.names.index(name) for name in told]
         own = [np.ix_(trial == one, at) for one in np.unique(trial)]
         fitted = np.array([np.sqrt(np.nanmean(self.square[rows])) for rows in own])
+        # Left out, a marker is farther by 1 / (1 - h): deletion residual.
         return fitted, fitted / (1 - np.array([self.share[rows].mean() for rows in own]))
 
 
@@ -404,10 +412,13 @@ def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
     rows = [body.markers.names.index(name) for name in names]
     segment, pose = [body.markers.segment[k] for k in rows], poses(body, q)
     J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))
+    # Coordinates that are free only: held joints follow nothing.
     J = J[:, :, np.concatenate([np.ones(body.n_root, dtype=bool), body.free])]
     weighted = np.swapaxes(J, 1, 2) * np.repeat(body.markers.weight[rows], 3)
+    # J'WJ with a ridge, as markers may leave a coordinate open.
     normal = weighted @ J
     normal += _RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / J.shape[2] * np.eye(J.shape[2])
+    # Diagonal of J (J'WJ)^-1 J'W: how far each coordinate of a marker follows itself.
     share = np.sum(np.swapaxes(J, 1, 2) * np.linalg.solve(normal, weighted), axis=1)
     return np.asarray(share.reshape(len(q), -1, 3).mean(axis=2))
 

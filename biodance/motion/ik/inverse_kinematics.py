@@ -59,8 +59,10 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> _D
     """
     free = np.concatenate([np.ones(body.n_root, dtype=bool), body.free])
     jacobian = general_jacobian(body, columns)[:, :, free]
+    # Columns of rotations per `_LEVER` of arc, comparable with a translation.
     jacobian[:, :, body.n_root // 2 :] /= _LEVER
     useful = seen & (body.markers.weight[columns] > 0)
+    # Long runs of frames see the same markers: one decision per pattern.
     first = np.concatenate([[True], (useful[1:] != useful[:-1]).any(axis=1)])[: len(useful)]
     patterns, which = np.unique(useful[first], axis=0, return_inverse=True)
     which = which.ravel()[np.cumsum(first) - 1]
@@ -79,15 +81,18 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> _D
 
 def _normal(jacobian: Array, weight: Array) -> Array:
     """Return (P, nv, nv) scaled normal matrices of P patterns of marker weights (P, K)."""
+    # Markers that a coordinate moves at all, with their weights: its scale.
     moves = np.abs(jacobian).max(axis=1) > 0
     moved = weight @ moves
     scale = 1 / np.sqrt(np.where(moved > 0, moved, 1.0))
+    # sum over markers k of weight[p, k] J_k'J_k, then scaled on both sides.
     pairs = np.swapaxes(jacobian, 1, 2) @ jacobian
     return np.asarray(np.tensordot(weight, pairs, axes=1) * scale[:, :, None] * scale[:, None])
 
 
 def _open(normal: Array) -> NDArray[np.bool_]:
     """Return (nv,) the coordinates that take part in a change of posture that the markers hardly see."""
+    # Eigenvectors of small eigenvalues: changes that hardly move a marker.
     value, vector = np.linalg.eigh(normal)
     return (np.abs(vector[:, value < _LEAST_MOTION**2]) > 0.2).any(axis=1)
 
@@ -176,6 +181,7 @@ def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> 
     stand_in = poses(problem.body, start).points(problem.segment, problem.chain.local)
     xyz, weight = problem.xyz.copy(), problem.weight.copy()
     xyz[frames] = np.where(hidden[:, :, None], stand_in, xyz[frames])
+    # Hidden markers pull so weakly that they decide only what no other marker tells.
     weight[frames] = np.where(hidden, _LEAN, weight[frames])
     return minimise_markers(replace(problem, xyz=xyz, weight=weight), frames, start)
 
@@ -263,6 +269,7 @@ class Follower:
             i, k = self.names.index(one), self.names.index(other)
             turned = np.array(xyz)
             turned[[i, k]] = turned[[k, i]]
+            # Share of the squared distance: below 1 where the exchange brings the markers nearer.
             left = float(minimise_markers(self._problem(turned)[0], _ONE, start[None]).cost[0] / plain)
             best = (one, other, left) if best is None or left < best[2] else best
         return best
@@ -284,6 +291,7 @@ class Follower:
         if np.isnan(self.q).any():
             return anew()
         found = minimise_markers(problem, _ONE, self.q[None])
+        # cost = 1/2 sum w d², so the weighted mean square is 2 cost / sum w.
         rms = np.sqrt(2 * found.cost[0] / problem.weight.sum())
         if rms > _BAD and self._frame - self._searched > _PATIENCE:
             self._searched = self._frame

@@ -85,6 +85,7 @@ def _joint(scaling: Scaling, theta: Array, cost: tuple[Array, Array], shown: NDA
     faulty = JointUnknowns(doubted).prior(theta)
     freed = np.array(shown)
     freed[own_unknowns(joint)] = True
+    # Gradient and information with another prior: the old prior's part out, the new one's in.
     moved = (
         gradient + faulty[1].T @ faulty[0] - usual[1].T @ usual[0],
         information + faulty[1].T @ faulty[1] - usual[1].T @ usual[1],
@@ -97,7 +98,9 @@ def _evidence(gradient: Array, information: Array, prior: tuple[Array, Array], f
     """Return the logarithm of the evidence up to the part of the cost that no prior changes."""
     own, pull = np.ix_(free, free), gradient[free]
     before = (prior[1].T @ prior[1])[own]
+    # log|P| of the prior over log|H| of the posterior, free unknowns alone.
     volume = np.linalg.slogdet(before)[1] - np.linalg.slogdet(information[own])[1]
+    # g'H^-1 g / 2: how far the cost would fall in a Newton step of the free unknowns.
     gain = pull @ np.linalg.solve(information[own], pull)
     return float(0.5 * (gain + volume - prior[0] @ prior[0]))
 
@@ -108,9 +111,11 @@ def _markers(cost: tuple[Array, Array], markers: MarkerSlopes, free: Index) -> d
     before = (FAULTY * error_size("soft_tissue", "marker")) ** -2
     inner = np.linalg.inv(information[np.ix_(free, free)])
     shared = markers.shared[:, :, free]
+    # Schur complement: the joints' unknowns adapt to a moved marker.
     pull = markers.gradient - shared @ (inner @ gradient[free])
     left = markers.information - shared @ inner @ np.swapaxes(shared, 1, 2) + before * np.eye(3)
     gain = np.einsum("ki,kij,kj->k", pull, np.linalg.inv(left), pull)
+    # Laplace with the prior N(0, 1 / before) of three coordinates: 3/2 log(before) - 1/2 log|left|.
     value = 0.5 * (gain + 3 * np.log(before) - np.linalg.slogdet(left)[1])
     return dict(zip(markers.names, value.tolist(), strict=True))
 
@@ -167,11 +172,14 @@ def evaluate_joints(
     found = solve_ik(body, postures, guess=guess)
     solved = np.asarray(found.status == FrameStatus.SOLVED)
     at = _Linear.of(body, postures, found.q, solved, noise=noise)
+    # Variable projection: only what no change of the posture undoes is a slope of the unknowns.
     free = at.left_open(unknowns.slope(body, stand, at.pose, at.points, theta))
     prior, prior_slope = unknowns.prior(theta)
+    # sum over frames t and rows r of free[t, r, p] residual[t, r].
     gradient = np.einsum("trp,tr->p", free, at.residual) + prior_slope.T @ prior
     information = np.einsum("trp,trs->ps", free, free, optimize=True) + prior_slope.T @ prior_slope
     cost = 0.5 * float(np.sum(at.residual**2) + prior @ prior)
+    # Rows hold sqrt(weight) / noise: the weighted mean square per coordinate, times three axes.
     rms = float(np.sqrt(3 * np.sum(at.residual**2) / np.sum(at.rows**2)))
     return CalibrationState(theta, found.q, solved, cost, gradient, information, rms)
 
@@ -193,9 +201,11 @@ def beside_sliding_skin(
     at = _Linear.of(body, postures, found.q, found.solved, noise=noise)
     joints = at.left_open(unknowns.slope(body, stand, at.pose, at.points, found.theta))
     kept = np.flatnonzero(body.markers.weight > 0)
+    # Columns: places of the markers, joints, and the residual as the last, so that one product holds all.
     rows = np.concatenate([at.left_open(_places(body, at.pose, kept)), joints, at.residual[..., None]], axis=2)
     angles = (found.q[found.solved] - stand)[:, body.nq - len(body.joints) :]
     every, shared, own = with_slides(body, np.swapaxes(rows, 1, 2) @ rows, angles, kept)
+    # Squares left over degrees of freedom: coordinates seen less those of the postures.
     left = without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
     square = without_slides(every, shared, own, float(left) * alike)
     each, place = 3 * len(kept), np.arange(3 * len(kept)).reshape(-1, 3)
@@ -236,6 +246,7 @@ class _Linear:
         seen = np.isfinite(apart)
         rows = (np.sqrt(body.markers.weight)[:, None] * seen / noise).reshape(len(points), -1)
         residual = rows * np.where(seen, apart, 0.0).reshape(len(points), -1)
+        # A joint at its limit cannot undo anything.
         place = place_jacobian(body, pose, segment, points) * _free(body, q[solved])[:, None]
         return cls(pose, points, rows, residual, rows[..., None] * place)
 
@@ -255,6 +266,7 @@ def _left_open(coordinates: Array, slope: Array) -> Array:
     """Return what of ``slope`` (T, r, p) no change of the ``coordinates`` (T, r, nv) can undo, frame by frame."""
     transposed = np.swapaxes(coordinates, 1, 2)
     square = transposed @ coordinates
+    # Ridge in proportion to the mean square: coordinates that no marker moves.
     size = np.einsum("tii->t", square)[:, None, None] / square.shape[1]
     return np.asarray(
         slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)

@@ -92,7 +92,9 @@ class JointUnknowns:
             arm = self.centres.place[hinge] - self.centres.lateral[hinge]
             swung = self._turn(hinge, theta) @ arm
             about = centre_sd(hinge, contradicted=hinge in self.centres.contradicted)
+            # Knee and elbow lie beside the lateral marker along the axis: turning it swings the expected centre.
             residual[rows] -= (swung - arm) / about
+            # d(R arm) / d turn = bone x R arm.
             slope[rows, k] = -np.cross(self.bone(hinge), swung) / about
             residual[k], slope[k, k] = theta[k] / sd, 1 / sd
         apart, apart_slope = self._sides(theta)
@@ -106,9 +108,11 @@ class JointUnknowns:
             for side, sign in (("right", 1.0), ("left", -1.0)):
                 ends = [f"{side}_{joint}" for joint in (upper, lower)]
                 wrong = [centre_sd(end, contradicted=True) for end in ends if end in self.centres.contradicted]
+                # A contradicted end may be off itself: its own standard deviation is added.
                 sd[row] = np.linalg.norm([sd[row], *wrong])
                 above, below = (self.centres.place[end] + theta[own_centre(end)] for end in ends)
                 length = np.linalg.norm(below - above)
+                # Slope of the length: unit vector along the limb, at either end with opposite sign.
                 along = sign * (below - above) / length
                 more[row] += sign * length
                 slope[row, own_centre(ends[0])] -= along
@@ -124,12 +128,15 @@ class JointUnknowns:
         upper, lower = centres.place[f"{side}_{_ABOVE[joint]}"], centres.place[hinge]
         length, right = np.linalg.norm(upper - lower), centres.right[hinge]
         y = (upper - lower) / length
+        # `right` without its part along the bone (Gram-Schmidt).
         across = right - (right @ y) * y
         z = across / np.linalg.norm(across)
         slope_y, slope_right = np.zeros((3, SIZE)), np.zeros((3, SIZE))
+        # Derivative of a unit vector: (1 - y y') / length times that of the difference.
         slope_y[:, own_centre(f"{side}_{_ABOVE[joint]}")] = (np.eye(3) - np.outer(y, y)) / length
         slope_y[:, own_centre(hinge)] = -(np.eye(3) - np.outer(y, y)) / length
         slope_right[:, own_turn(hinge)] = np.cross(self.bone(hinge), right)
+        # d(right - (right.y) y), then projected on the plane square to z and divided by the length.
         slope = slope_right - np.outer(y, y @ slope_right + right @ slope_y) - (right @ y) * slope_y
         return z, (np.eye(3) - np.outer(z, z)) @ slope / np.linalg.norm(across)
 
@@ -143,6 +150,7 @@ class JointUnknowns:
         (P - C) r. That the two axes of the ankle turn with the shank is left out.
         """
         rest = poses(body, stand[None]).rotation[0]
+        # R R_rest': carries a vector of the static posture along with the segment.
         carried = pose.rotation @ np.swapaxes(rest, -1, -2)
         hangs = below(body)[:, list(body.markers.segment)]
         out = np.zeros((*points.shape, SIZE))
@@ -156,6 +164,7 @@ class JointUnknowns:
             if name in HINGES:
                 arm = points[:, on] - pose.joint_position[:, chain[0], None]
                 z, slope = self.axis(name, theta)
+                # Rotation vector r = z x dz; a point at `arm` moves by ((P - C) r) x arm = -[arm]x (P - C) r.
                 out[:, on] -= skew(arm) @ (apart @ (skew(z) @ slope))
         return out.reshape(len(points), -1, SIZE)
 
@@ -184,6 +193,7 @@ def excited(centres: Centres, theta: Array, information: Array) -> NDArray[np.bo
     A hinge is judged by its axis.
     """
     slope = JointUnknowns(centres).prior(theta)[1]
+    # Standard deviations by the prior alone, and with the movement.
     before, after = (np.sqrt(np.diag(np.linalg.inv(known))) for known in (slope.T @ slope, information))
     out = np.zeros(SIZE, dtype=bool)
     for joint in JOINTS:
@@ -216,6 +226,7 @@ def mismarked(far: float) -> float:
 
         p / (1 - p)  N(far; 0, FAULTY^2) / N(far; 0, 1),    p = `MISMARKED`.
     """
+    # Log odds: prior, ratio of the normal densities' factors, and of their exponents.
     return float(expit(logit(MISMARKED) - np.log(FAULTY) + far**2 / 2 * (1 - FAULTY**-2)))
 
 
@@ -249,6 +260,7 @@ def knees_elsewhere(
             continue
         ways = _ways(centres, knee)
         ahead, turned = ways @ theta
+        # Variance of the posterior mean: what the data took off the prior's.
         expected = np.einsum("ki,ij,kj->k", ways[:, free], before - after, ways[:, free])
         far = float(np.max(np.abs([ahead, turned]) / np.sqrt(expected)))
         if mismarked(far) > 0.5:
@@ -262,6 +274,7 @@ def _ways(centres: Centres, knee: str) -> Array:
     forwards = np.cross(bone, centres.right[knee])
     forwards /= np.linalg.norm(forwards)
     out[0, own_centre(knee)] = forwards
+    # Turning the axis swings the centre about the lateral marker: what of it goes forwards is no move of the axis.
     out[0, own_turn(knee)] = -forwards @ np.cross(bone, centres.place[knee] - centres.lateral[knee])
     out[1, own_turn(knee)] = 1.0
     return out

@@ -63,6 +63,7 @@ class Leg:
 
     def _length_terms(self) -> tuple[float, float, float]:
         """Return a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee)."""
+        # |thigh + K R shank|², K'thigh = (x, y, z), shank = (u, v, w), R a turn by the knee about -z.
         x, y, z = self.knee_turn.T @ self.thigh
         u, v, w = self.shank
         constant = self.thigh @ self.thigh + self.shank @ self.shank + 2 * w * z
@@ -75,6 +76,7 @@ class Leg:
 
     def _knee(self, length: Array) -> Array:
         a, b, c = self._length_terms()
+        # cos(knee - atan2(c, b)) = (length² - a) / hypot(b, c).
         reach = np.clip((length**2 - a) / np.hypot(b, c), -1.0, 1.0)
         return np.arctan2(c, b) + np.arccos(reach)
 
@@ -90,13 +92,17 @@ class Leg:
         distance = np.linalg.norm(away, axis=1)
         length = soft_limit(distance, float(self.length(np.radians(0.3))), 0.002)
         knee = self._knee(length)
+        # Foot's axes: the way from ankle to hip.
         local = np.einsum("tji,tj->ti", foot_turn, away * (length / distance)[:, None])
         bend = axis_rotation(np.array([0.0, 0.0, -1.0]), knee)
+        # From ankle to hip with ankle angles zero, from shank and bent thigh.
         leg = -(self.shank + np.einsum("tji,j->ti", bend, self.knee_turn.T @ self.thigh))
         leg = leg @ self.ankle_turn
+        # The inversion about x is fixed by the component that the dorsiflexion about z leaves alone.
         inversion = _solve_sine(local[:, 1], local[:, 2], leg[:, 2])
         cosine, sine = np.cos(inversion), np.sin(inversion)
         y = cosine * local[:, 1] - sine * local[:, 2]
+        # Angle between the two directions in the plane of the dorsiflexion.
         dorsiflexion = np.arctan2(leg[:, 1], leg[:, 0]) - np.arctan2(y, local[:, 0])
         dorsiflexion = (dorsiflexion + np.pi) % (2 * np.pi) - np.pi
         below = self.knee_turn @ bend @ self.ankle_turn
@@ -105,6 +111,7 @@ class Leg:
             @ axis_rotation(np.array([0.0, 0.0, 1.0]), dorsiflexion)
             @ axis_rotation(np.array([1.0, 0.0, 0.0]), inversion)
         )
+        # What rotation remains between pelvis and foot belongs to the hip.
         hip_turn = np.swapaxes(pelvis_turn @ self.hip_turn, 1, 2) @ foot_turn @ np.swapaxes(below, 1, 2)
         flexion, adduction, rotation = zxy_angles(hip_turn)
         s = self.sign
@@ -119,6 +126,7 @@ def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
 
 def _solve_sine(y: Array, z: Array, wanted: Array) -> Array:
     """Return the small angle i with ``y sin i + z cos i = wanted``."""
+    # y sin i + z cos i = hypot(y, z) sin(i + atan2(z, y)).
     return np.arcsin(np.clip(wanted / np.hypot(y, z), -1.0, 1.0)) - np.arctan2(z, y)
 
 
@@ -164,8 +172,10 @@ class GeneralLeg:
         hip = _meeting(rotation[:3], translation[:3], axis[:3])
         low, high = (np.array([limit[j] for j in columns]) for limit in (body.limits.lower, body.limits.upper))
         terms = _length_terms(rotation, translation, axis, hip, low, high)
+        # Largest value of a + b cos + c sin is at atan2(c, b): the straight leg.
         straight = float(np.arctan2(terms[2, 0], terms[1, 0]))
         sense = 1.0 if high[KNEE] + low[KNEE] > 2 * straight else -1.0
+        # a + hypot(b, c): the squared length there.
         longest = float(np.sqrt(terms[0, 0] + np.hypot(terms[1, 0], terms[2, 0])))
         joints = LegJoints(rotation, translation, axis, hip, longest)
         leg = cls(columns, joints, hip, straight, sense, terms, np.zeros(6))
@@ -228,6 +238,7 @@ def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:
     normal, right = np.zeros((3, 3)), np.zeros(3)
     for R, p, a in zip(rotation, translation, axis, strict=True):
         place, turn = place + turn @ p, turn @ R
+        # Least squares of the distances to all axes: (1 - a a') (x - p) = 0 of each.
         across = np.eye(3) - np.outer(turn @ a, turn @ a)
         normal, right = normal + across, right + across @ place
     return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
@@ -247,4 +258,5 @@ def _length_terms(rotation: Array, translation: Array, axis: Array, hip: Array, 
         squares.append(np.sum((place - hip) ** 2, axis=1))
     at_zero, at_right, at_half = squares
     a = (at_zero + at_half) / 2
+    # f(0) = a + b, f(pi) = a - b, f(pi / 2) = a + c.
     return np.stack([a, at_zero - a, at_right - a])

@@ -171,6 +171,7 @@ def search(problem: MarkerProblem, frames: Index) -> Minimum:
     )
     known = np.zeros(0, dtype=np.intp)
     for stride in _STRIDES:
+        # Coarse frames first, the last one always; those between start from what is solved around them.
         level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
         if not known.size:
             found = from_markers(problem, frames[level], SHARES if count > _SHORT else (*SHARES, *MORE_SHARES))
@@ -203,6 +204,7 @@ def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
 
 def _retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     """Return ``found`` with doubtful frames tried again, from their markers and from sound frames beside."""
+    # cost = 1/2 sum w r².
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
     doubtful = rms > _DOUBT[0] * median_filter(rms, min(_NEIGHBOURS, len(rms)), mode="mirror") + _DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)

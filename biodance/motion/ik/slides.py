@@ -31,6 +31,7 @@ def with_slides(body: Body, products: Array, angles: Array, kept: Index) -> tupl
     """
     on, beside = np.array(body.markers.segment)[kept], neighbours(body) > 0
     blocks = [(np.flatnonzero(np.repeat(on, 3) == one), angles[:, beside[:, one]]) for one in np.unique(on)]
+    # Moments with the angles: sum over t of angle[t, n] X'X[t, own, :].
     shared = [np.tensordot(turn, products[:, own], axes=(0, 0)) for own, turn in blocks]
     square = []
     for own, turn in blocks:
@@ -39,6 +40,7 @@ def with_slides(body: Body, products: Array, angles: Array, kept: Index) -> tupl
             pairs = (turn[:, :, None] * other[:, None]).reshape(len(angles), -1)
             block = np.tensordot(pairs, products[:, own][:, :, others], axes=(0, 0))
             block = block.reshape(turn.shape[1], other.shape[1], own.size, others.size)
+            # Angles first, then columns, as in `shared`.
             row.append(block.transpose(0, 2, 1, 3).reshape(turn.shape[1] * own.size, -1))
         square.append(row)
     return (
@@ -52,5 +54,7 @@ def without_slides(square: Array, shared: Array, own: Array, noise: float) -> Ar
     """Return the products ``square`` (p, p) of rows of variance ``noise`` without slides: ``own`` (s, s) of these,
     ``shared`` (s, p) with the rows.
     """
+    # Prior N(0, s²) of a slide, in the units of rows with variance `noise`.
     inner = own + noise * error_size("slide", "marker") ** -2 * np.eye(len(own))
+    # Schur complement: X'X - X'S (S'S + noise / s²)^-1 S'X.
     return np.asarray((square - shared.T @ np.linalg.solve(inner, shared)) / noise)

@@ -49,6 +49,7 @@ class Aim:
 
     def at(self, time: Array) -> Array:
         """Return the point (T, 3) m at ``time`` (T,) s."""
+        # Fourier coefficients of a real periodic curve; those beyond the mean stand for a pair of frequencies.
         spectrum = np.fft.rfft(self.sway, axis=0)[: HARMONICS + 1] / len(self.sway)
         wave = np.exp(2j * np.pi * np.outer(time / self.period, np.arange(len(spectrum))))
         wave[:, 1:] *= 2
@@ -81,6 +82,7 @@ class BeltFoot:
         s = np.clip(gait.since_strike(time, self.side) / gait.contact, 0.0, 1.0)
         along, middle = self.length * _roll(s), self.length * _UNDER
         back = -gait.speed * gait.contact * (s - 0.5)
+        # The belt carries the foot back, from half its way ahead to half behind.
         x = self.lead + back + (along - middle) * np.cos(self.out)
         y = self.sign * (0.5 * gait.width + along * np.sin(self.out))
         return np.stack([x, y, 0.0 * x], axis=1)
@@ -88,7 +90,9 @@ class BeltFoot:
     def force(self, gait: Gait, time: Array, mass: float, aim: Aim) -> Array:
         """Return the ground's force (T, 3) N on the foot: smooth, zero in swing, towards the point of ``aim``."""
         s = gait.since_strike(time, self.side) / gait.contact
+        # Two feet share the weight: each one's impulse over a stride is half of m G times the stride.
         vertical = 0.5 * gait.stride * mass * G / (gait.contact * _mean_pulse(gait)) * _pulse(gait, s)
+        # Force along (aim - pressure), its vertical part as prescribed.
         return vertical[:, None] * (aim.at(time) - self.pressure(gait, time)) / aim.height
 
     def path(self, gait: Gait, time: Array) -> tuple[Array, Array]:
@@ -99,6 +103,7 @@ class BeltFoot:
         ends = [_end(self, gait, at) for at in (1.0, 0.0)]
         swing = gait.stride - gait.contact
         u = np.clip((t - gait.contact) / swing, 0.0, 1.0)
+        # u³ (1 - u)³ has its top 1/64 in the middle, and no rate or second rate at the ends.
         bump = gait.clearance * 64 * u**3 * (1 - u) ** 3
         moved = [_hermite(u, swing, [end[k] for end in ends]) for k in range(3)]
         pitch, x, z = (np.where(on, a, b) for a, b in zip((pitch, x, z), (*moved[:2], moved[2] + bump), strict=True))
@@ -120,6 +125,7 @@ def _pulse(gait: Gait, s: Array) -> Array:
         return np.where(on, np.sin(np.pi * s) ** 2, 0.0)
     rise = 1.2 * (1 - 0.5 / gait.stance)
     share, quick = _LIGHT[0], _LIGHT[1] / gait.contact
+    # Slow and quick rise in their shares, at the beginning and mirrored at the end.
     grows, falls = ((1 - share) * septic(x / rise) + share * septic(x / quick) for x in (s, 1 - s))
     return np.where(on, grows * falls * (1 - gait.dip * np.cos(4 * np.pi * (s - 0.5))), 0.0)
 
@@ -138,6 +144,7 @@ def _rolling(foot: BeltFoot, gait: Gait, s: Array) -> tuple[Array, Array, Array]
     pitch = gait.strike * (1 - septic(s / first)) - gait.push * over**3 * (2 - over)
     end = np.where(pitch > 0, HEEL, TOE) * foot.length
     c, w = np.cos(pitch), np.sin(pitch)
+    # The ankle at (-end, height) from the end of the sole that it turns about, turned by the pitch.
     x = end - end * c - foot.height * w
     pad = _hermite(
         np.clip(s * gait.contact / _STOPPED, 0.0, 1.0), _STOPPED, [(0.5 * _LANDS * _STOPPED, -_LANDS, 0.0), (0.0,) * 3]
@@ -155,6 +162,7 @@ def _end(foot: BeltFoot, gait: Gait, at: float) -> list[tuple[float, float, floa
     out = []
     for curve in _rolling(foot, gait, s):
         a, b, c, d = curve
+        # One-sided differences of third and second order over four points.
         rate = (-11 * a + 18 * b - 9 * c + 2 * d) / 6
         out.append((float(a), float(rate * sign), float((2 * a - 5 * b + 4 * c - d) * sign**2)))
     return out
@@ -164,6 +172,7 @@ def _hermite(u: Array, span: float, ends: list[tuple[float, float, float]]) -> A
     """Return the quintic (T,) over ``u`` 0..1 of ``span`` s with value, rate and second rate at both ``ends``."""
     (p0, v0, a0), (p1, v1, a1) = ((p, v * span, a * span**2) for p, v, a in ends)
     d, e, f = p1 - p0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
+    # Horner: the coefficients of u³ to u⁵ solve for value, rate and second rate at u = 1.
     return p0 + u * (
         v0 + u * (a0 / 2 + u * (10 * d - 4 * e + f / 2 + u * (-15 * d + 7 * e - f + u * (6 * d - 3 * e + f / 2))))
     )
@@ -222,6 +231,7 @@ class _Problem:
     def aimed(self, height: float, sway: Array) -> Aim:
         """Return the aim at ``height`` m whose forces push nobody ahead or aside in the mean."""
         force, _ = self.carried(Aim(height, self.gait.stride, sway))
+        # An aim that lies s aside adds s V / height to the force: solved for no mean force.
         return Aim(height, self.gait.stride, sway - height * force[:, :2].mean(axis=0) / force[:, 2].mean())
 
     @cached_property
@@ -246,12 +256,15 @@ class _Problem:
         """
         force, moment = self.carried(aim)
         weight = self.person.mass * G
+        # a = F / m - g, integrated twice over a period: what repeats has no drift.
         com = _integral(_integral(force / self.person.mass - [0.0, 0.0, G], self.gait.stride), self.gait.stride)
         com[:, 2] += height
         about = (moment - np.cross(com, force)).mean(axis=0) / weight
+        # Moving the centre by d changes the mean moment by -d x weight: (-d_y, d_x) times the weight.
         com[:, :2] += np.array([-about[1], about[0]])
         rate = moment - np.cross(com, force)
         twist = -rate[:, 2].mean() / weight
+        # A moment in proportion to the vertical force, so that none is left in the mean.
         rate[:, 2] += twist * force[:, 2]
         return com, _integral(rate, self.gait.stride), float(twist)
 
@@ -274,9 +287,11 @@ class _Problem:
     def moved(self, q: Array) -> tuple[Array, Array]:
         """Return the centre of mass (N, 3) m and the angular momentum (N, 3) N·m·s about it of the nodes."""
         around = np.arange(-_PAD, len(q) + _PAD)
+        # Nodes of the neighbouring strides, so that the spline's ends are far from this one.
         motion = motion_through(around / STRIDE_RATE, q[np.mod(around, len(q))], self.time)
         pin, (model, data) = load_pinocchio(), self.model
         centre, spin = np.empty((len(q), 3)), np.empty((len(q), 3))
+        # Angular momentum about the centre of mass, lab axes.
         for k in range(len(q)):
             spin[k] = pin.computeCentroidalMomentum(model, data, motion.q[k], motion.v[k]).angular
             centre[k] = data.com[0]
@@ -324,11 +339,13 @@ def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> Found
         q, short = problem.posed(upper, root, turned)
         centre, has = problem.moved(q)
         lacks = spin - has
+        # Only up to a constant: a body that turns evenly has one, too.
         lacks = lacks - lacks.mean(axis=0)
         missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
         if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
             return FoundStride(q, aim, twist, missed)
         level, root = level - _EASE * short, root + _EASE * (com - centre)
+        # Momentum over inertia is a rate; its integral the angle still to turn.
         step = _EASE * _integral(lacks / lever, gait.stride)
         if learns and number < _LEARNED:
             sway = sway + _EASE * _sway(lacks, problem.carried(aim)[0][:, 2], gait.stride, height / level)
@@ -344,8 +361,11 @@ def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> Found
 def _sway(lacks: Array, vertical: Array, period: float, lever: float) -> Array:
     """Return by how much (N, 2) m the forces must aim elsewhere to take off the angular momentum ``lacks`` (N, 3)."""
     spectrum = np.fft.rfft(lacks[:, :2], axis=0)
+    # Derivative of a periodic curve: times i omega.
     spectrum *= 2j * np.pi * np.fft.rfftfreq(len(lacks), period / len(lacks))[:, None]
     rate = np.fft.irfft(spectrum, len(lacks), axis=0)
+    # The forces make more than the motion has: their moment about the centre, (l F_y, -l F_x),
+    # must fall by the rate.
     return np.asarray(lever * np.stack([rate[:, 1], -rate[:, 0]], axis=1) / vertical[:, None])
 
 
@@ -354,6 +374,7 @@ def _integral(rate: Array, period: float) -> Array:
     frequency = 2j * np.pi * np.fft.rfftfreq(len(rate), period / len(rate))
     spectrum = np.fft.rfft(rate, axis=0)
     spectrum[0] = 0.0
+    # Integral: divided by i omega; the mean has none.
     return np.asarray(np.fft.irfft(spectrum / np.where(frequency == 0, 1, frequency)[:, None], len(rate), axis=0))
 
 
@@ -374,6 +395,7 @@ class GaitPerformance(Performance):
         asked = {foot.side: self._asked(foot, time) for foot in self.feet}
         total = np.sum([*asked.values()], axis=0)
         share = asked[side][:, 2:3] / np.maximum(total[:, 2:3], 1e-9)
+        # What the motion needs beyond the prescribed forces, shared as the vertical ones.
         value = asked[side] + share * (self._wrench_spline(time) - total)
         return np.asarray(np.where(asked[side][:, 2:3] > 0, value, 0.0))
 
@@ -388,6 +410,7 @@ class GaitPerformance(Performance):
         moment[:, 2] += self.stride.twist * force[:, 2]
         turn = turn_about(Z, np.array([self.stance.heading]))[0]
         force, moment = force @ turn.T, moment @ turn.T
+        # From the belt's middle to the lab's origin.
         return np.concatenate([force, moment + np.cross(self.middle, force)], axis=1)
 
     @cached_property
@@ -423,6 +446,7 @@ def perform_gait(
     nodes, time = found.q[np.mod(index, len(found.q))].copy(), index / STRIDE_RATE
     turn = turn_about(Z, np.array([stance.heading]))[0]
     nodes[:, :3] = nodes[:, :3] @ turn.T + floor_between(stance.ankle)
+    # R_lab,belt times the nodes' rotation.
     nodes[:, 3:7] = without_jumps((Rotation.from_matrix(turn) * Rotation.from_quat(nodes[:, 3:7])).as_quat())
     curves = Curves(time, np.zeros((time.size, WIDTH)))
     return GaitPerformance(plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, stride=found)
@@ -437,5 +461,6 @@ def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, s
     own = {name: getattr(gait, name) * float(1 + tolerances.performance * rng.normal()) for name in names}
     own = {name: value * (size if name in ("width", "clearance") else 1) for name, value in own.items()}
     pace = np.sqrt(size) * float(1 + 0.3 * tolerances.performance * rng.normal())
+    # Even number of nodes: the left foot strikes at one, too.
     stride = 2 * round(0.5 * gait.stride * pace * STRIDE_RATE) / STRIDE_RATE
     return replace(gait, speed=float(np.sqrt(size)) * (speed or gait.speed), stride=stride, **own)

@@ -85,9 +85,11 @@ class Performance:
         wrench = self.wrench(time)
         share = self.share_right(time)[:, None]
         pressure, stance = wrench.cop(threshold=1.0), self.stance
+        # Mean of the places, weighted with the load.
         middle = share * stance.pressure["right"] + (1 - share) * stance.pressure["left"]
         weight = share if side == "right" else 1 - share
         place = np.zeros_like(pressure)
+        # So the weighted mean of both places is the common pressure, and the moments add up.
         place[:, :2] = stance.pressure[side] + pressure[:, :2] - middle
         twist = wrench.moment - np.cross(pressure, wrench.force)
         return np.concatenate([weight * wrench.force, weight * (np.cross(place, wrench.force) + twist)], axis=1)
@@ -159,10 +161,13 @@ def keep_balance(
         motion = _motion(_splines(time, q), time)
         value = true_wrench(person, motion).value
         vertical = value[:, 2]
+        # Zero-moment point of the needed wrench.
         error = np.stack([-value[:, 4], value[:, 3]], axis=1) / vertical[:, None] - target
         if np.abs(error).max() < SETTLED:
             break
+        # Height over vertical acceleration: z m / Fz = z / (g + a).
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
+        # Smoothing that leaves parabolas as they are and takes off what alternates from node to node.
         moved, smooth = _pendulum(error, pendulum, 1.0 / NODE_RATE), np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0
         xy = xy - 0.95 * np.asarray(correlate1d(moved, smooth, axis=0, mode="nearest"))
         q = posing.stand_on_feet(person, pose, curves, stance, xy, height=height)
@@ -171,8 +176,10 @@ def keep_balance(
 
 def _pendulum(right: Array, h: Array, step: float) -> Array:
     """Solve d - h d'' = right (T, 2) for d with d' = 0 at both ends; ``h`` (T,) s², ``step`` s."""
+    # Central differences: -k d_(i-1) + (1 + 2 k) d_i - k d_(i+1).
     k = h / step**2
     bands = np.stack([np.roll(-k, 1), 1 + 2 * k, np.roll(-k, -1)])
+    # No slope at the ends: the neighbour beyond an end is the mirror image, so k counts twice.
     bands[0, 1], bands[2, -2] = -2 * k[0], -2 * k[-1]
     return solve_banded((1, 1), bands, right)
 
@@ -191,12 +198,15 @@ def motion_through(node_time: Array, nodes: Array, time: Array) -> Motion:
 def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
     """Return the motion of splines through [position, quaternion, angles]; velocities of the root in its own frame."""
     value, rate, rate2 = (spline(time) for spline in splines)
+    # A spline through unit quaternions is not of unit length in between.
     norm = np.linalg.norm(value[:, 3:7], axis=1, keepdims=True)
     quaternion = value[:, 3:7] / norm
     turn = np.swapaxes(Rotation.from_quat(quaternion).as_matrix(), 1, 2)
+    # Changes of length are along q itself: the scalar part of q* q', which is dropped.
     angular = _twice_conjugate_times(quaternion, rate[:, 3:7] / norm)
     angular_rate = _twice_conjugate_times(quaternion, rate2[:, 3:7] / norm)
     linear = np.einsum("tij,tj->ti", turn, rate[:, :3])
+    # d/dt (R'u) = R'u' - w x R'u.
     linear_rate = np.einsum("tij,tj->ti", turn, rate2[:, :3]) - np.cross(angular, linear)
     q = np.concatenate([value[:, :3], quaternion, value[:, 7:]], axis=1)
     v = np.concatenate([linear, angular, rate[:, 7:]], axis=1)
@@ -216,9 +226,11 @@ def true_wrench(person: Person, motion: Motion) -> Wrench:
     model = person.loaded_body.model.copy()
     model.gravity = pin.Motion(np.array(GRAVITY), np.zeros(3))
     data = model.createData()
+    # First six: force and moment on the root, in its own frame.
     root = np.array([pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(motion.q, motion.v, motion.a, strict=True)])
     turn = Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
     force, moment = np.einsum("tij,tj->ti", turn, root[:, :3]), np.einsum("tij,tj->ti", turn, root[:, 3:])
+    # M + p x F: about the lab's origin.
     return Wrench(motion.time, np.concatenate([force, moment + np.cross(motion.q[:, :3], force)], axis=1))
 
 
@@ -355,6 +367,7 @@ def copy_dance(
         + performer.sway * tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
     )
     apart = shown.ankle[1, 1] - shown.ankle[0, 1]
+    # Lever rule: all on the right foot where the pressure lies under it.
     values[:, posing.SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
     curves = posing.Curves(time, values)
     pose = posing.upper_body(person, curves, stance, tolerances, rng)
@@ -377,6 +390,7 @@ def _fields(shown: Shown) -> Array:
 
 def pelvis_angles(turn: Array) -> Array:
     """Return forward tilt, right drop and left turn (T, 3) degrees of lab_R_pelvis (T, 3, 3), facing lab x."""
+    # Intrinsic: turn about up, drop about forward, then about right (backward positive).
     left, drop, back = Rotation.from_matrix(UPRIGHT.T @ turn).as_euler("YXZ").T
     return np.degrees(np.stack([-back, drop, left], axis=1))
 
@@ -408,6 +422,7 @@ def _reach(body: Body, turn: Array, xy: Array, ankle: dict[str, Array], raised: 
     body).
     """
     tops, length = posing.leg_tops(body, turn, xy, ankle)
+    # Soft minimum: -log(sum of exp(-k h)) / k; a raised foot is let go by metres.
     return -logsumexp(-SOFTNESS * (tops + AWAY * raised.T), axis=0) / SOFTNESS, length
 
 

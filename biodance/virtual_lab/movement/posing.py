@@ -62,6 +62,7 @@ def _there_and_back(time: Array, step: ProtocolStep) -> Array:
     x, count = time / step.period, step.cycles
     fine = np.linspace(0.0, count + 1.0, 400 * (count + 1) + 1)
     pace = septic(fine) * septic(count + 1.0 - fine)
+    # Integral of the pace, scaled to whole cycles.
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]) * np.diff(fine))])
     turned = CubicSpline(fine, phase * count / phase[-1])(np.clip(x, 0.0, count + 1.0))
     return 0.5 - 0.5 * np.cos(2 * np.pi * turned)
@@ -216,6 +217,7 @@ def upper_body(
     upper = ~np.isin(np.arange(angle.shape[1]), [body.joint_index(f"{side}_{name}") for side in SIDES for name in LEG])
     angle[:, upper] += tremor[:, :-3][:, upper]
     q = np.zeros((time.size, body.nq))
+    # Both stops: the upper one, then the lower one as an upper one of the negative angle.
     q[:, 7:] = -soft_limit(-soft_limit(angle, body.limits.upper, 0.1), -body.limits.lower, 0.1)
     q[:, 3:7] = without_jumps(Rotation.from_matrix(turn).as_quat())
     return Pose(q, turn)
@@ -242,6 +244,7 @@ def turn_about(axis: Array, angle: Array) -> Array:
 
 def without_jumps(quaternion: Array) -> Array:
     """Return quaternions (T, 4) without jumps of sign."""
+    # q and -q are one rotation: a flip holds for all later frames.
     flips = np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0)
     return np.asarray(quaternion * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
 
@@ -255,6 +258,7 @@ def leg_tops(body: Body, turn: Array, xy: Array, ankle: dict[str, Array]) -> tup
         leg = Leg.of(body, side)
         hip, reach = turn @ leg.hip, float(leg.length(STRAIGHT))
         across = np.sum((xy + hip[:, :2] - ankle[side][:2]) ** 2, axis=1)
+        # Pythagoras from hip to ankle; a hip that is too far aside is still half a leg above its ankle.
         tops.append(ankle[side][2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2])
         lengths.append(reach)
     return np.array(tops), float(np.mean(lengths))
@@ -264,6 +268,7 @@ def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance
     """Return the height (T,) m of the pelvis over ``xy`` (T, 2): as high as planted legs allow, less the depth."""
     tops, length = leg_tops(person.body, pose.pelvis_turn, xy, stance.ankle)
     weight = np.array([1.0 - curves.raised(side) for side in SIDES])
+    # Soft minimum, weighted: a foot in the air has no say.
     height = -logsumexp(-_SHARPNESS * tops, axis=0, b=weight) / _SHARPNESS
     return height - curves["depth"][:, 0] * length
 
@@ -288,6 +293,7 @@ def stand_on_feet(
         planted = leg.solve(pose.pelvis_turn, q[:, :3], turn, ankle)
         free = np.concatenate([np.radians(curves[f"{side}_leg"]), np.zeros((frames, 1))], axis=1)
         q[:, [7 + c for c in leg.columns]] = (
+            # 4 r (1 - r): one in the middle of rising, zero when planted or free.
             (1 - raised) * planted + raised * free + 4 * raised * (1 - raised) * CLEARANCE
         )
     return q
@@ -323,6 +329,7 @@ def sit(person: Person, pose: Pose, curves: Curves, place: FootStance, hips: flo
     under = np.mean([leg.hip for leg in legs], axis=0) - np.array([0.0, _FLESH, 0.0])
     seat = np.array([*place.ankle["right"][:2], hips - _FLESH])
     q = pose.q.copy()
+    # The point under the hips stays on the seat whatever the pelvis turns by.
     q[:, :3] = seat - pose.pelvis_turn @ under
     for side, leg in zip(SIDES, legs, strict=True):
         angle = np.radians(curves[f"{side}_leg"])
@@ -339,5 +346,7 @@ def _on_seat(angle: Array, turn: Array, thigh: float) -> Array:
     long: at adduction a and flexion f of an upright pelvis the knee is thigh cos f cos a below the hip.
     """
     raised = np.arcsin(np.clip(turn[:, 2, 0], -1.0, 1.0))  # the pelvis' own forward axis, over the horizontal
+    # cos f cos a = sinks / thigh, less what the pelvis leans itself; adduction to 60 degrees at most.
     least = np.arccos(np.clip(_SINKS / (thigh * np.maximum(np.cos(angle[:, 1]), 0.5)), -1.0, 1.0)) - raised
+    # A lower stop is an upper one of the negative angle.
     return np.asarray(-soft_limit(-angle[:, 0], -least, _SOFT))

@@ -25,8 +25,10 @@ def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
     and a linear map of the points, A J A', keeps it so.
     """
     gyration = np.asarray(radii, float) ** 2
+    # k_x² = mean of y² + z²: the mean of x² is (k_x² + k_y² + k_z²) / 2 - k_x².
     second = np.diag(0.5 * gyration.sum() - gyration)
     out = np.empty((4, 4))
+    # Parallel axes: second moments about the origin.
     out[:3, :3] = mass * (second + np.outer(com, com))
     out[:3, 3] = out[3, :3] = mass * np.asarray(com)
     out[3, 3] = mass
@@ -36,6 +38,7 @@ def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
 def parameters_of_inertia(J: Array) -> Array:
     """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the frame's origin (kg, kg·m, kg·m²)."""
     second = J[:3, :3]
+    # I = tr(S) 1 - S.
     inertia = np.trace(second) * np.eye(3) - second
     rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
     return np.concatenate([[J[3, 3]], J[:3, 3], inertia[rows, columns]])
@@ -46,6 +49,7 @@ def of_parameters(phi: Array) -> Array:
     xx, xy, yy, xz, yz, zz = phi[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     out = np.empty((4, 4))
+    # The inverse: tr(I) = 2 tr(S), S = tr(I) / 2 - I.
     out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     out[:3, 3] = out[3, :3] = phi[1:4]
     out[3, 3] = phi[0]
@@ -56,13 +60,16 @@ def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
     """Return J of the same body in another frame, given the pose (3, 3), (3,) m of its present frame in the other."""
     move = np.eye(4)
     move[:3, :3], move[:3, 3] = rotation, position
+    # Points go to M p, so their second moments go to M J M'.
     return move @ J @ move.T
 
 
 def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
     """Return J after a random linear map of the body about its CoM and a random shift, relative to its own size."""
     com = J[:3, 3] / J[3, 3]
+    # About the centre of mass, so that a map of the shape does not move it.
     centred = place_inertia(J, np.eye(3), -com)
+    # Root mean square size along each axis.
     size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
     return place_inertia(
         centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3)
@@ -96,11 +103,13 @@ def draw_sip(
         percent, *rest = table[kind]
         place = size[kind] * np.array(rest)
         if segment.startswith("left"):
+            # Mirror image: z to the other side.
             place[2] = -place[2]
         side = np.exp(tolerances.side_mass * rng.normal() if kind != segment else 0.0)
         inertia = true_pseudo_inertia(percent * factor[kind] * side, place[:3], place[3:])
         bodies.append(_stretched(inertia, rng, tolerances.segment_shape, tolerances.com))
     total = sum(J[3, 3] for J in bodies)
+    # Linear in J: masses add up to the declared one, shapes stay.
     phi = np.concatenate([parameters_of_inertia(J * subject.mass / total) for J in bodies])
     return Sip(skeleton.TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))
 
@@ -242,6 +251,7 @@ def _box(phi: Array) -> Array:
     """Return the box (2, 3) m about the CoM that has the segment's second moments, for drawing only."""
     J = of_parameters(phi)
     com = J[:3, 3] / J[3, 3]
+    # A uniform box of half side h has the second moment h² / 3.
     half = np.sqrt(3.0 * np.clip(np.diag(J)[:3] / J[3, 3] - com**2, 1e-6, None))
     return np.stack([com - half, com + half])
 
@@ -252,6 +262,7 @@ def _sole(size: skeleton.Proportions, side: str) -> Foot:
     right = [(back, 0.6 * half), (0.55 * front, half), (front, 0.5 * half)]
     corners = [*right, *((x, -z) for x, z in reversed(right))]
     outline = [skeleton.on_side(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
+    # Mirrored corners run the other way round: turned back to the same sense.
     return Foot(skeleton.TRUE_SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
 
 
@@ -313,9 +324,11 @@ def _fit_prosthesis(sip: Sip, segment: str, less: float) -> Sip:
         raise BiodanceError(
             f"{segment}: the limb weighs {mass:.2f} kg; it can be 0 to {mass:.2f} kg lighter, not {less}."
         )
+    # y is along the limb: matter goes to `_STUMP` of its distance from the joint, the mass stays.
     squeezed = np.diag([1.0, _STUMP, 1.0, 1.0])
     bodies[limb[0]] = squeezed @ bodies[limb[0]] @ squeezed
     total = float(sip.mass.sum())
+    # What the limb loses all others gain in proportion.
     scale = [1 - less / mass if k in limb else 1 + less / (total - mass) for k in range(len(bodies))]
     phi = np.concatenate([parameters_of_inertia(times * J) for times, J in zip(scale, bodies, strict=True)])
     return Sip(sip.segments, phi, sip.covariance)

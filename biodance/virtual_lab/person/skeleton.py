@@ -85,9 +85,11 @@ def smooth_noise(rng: np.random.Generator, time: Array, *, columns: int, cutoff:
     ``time`` (T,) s, equidistant; ``cutoff`` Hz: the amplitude spectrum falls as exp(-(f / cutoff)²), so all derivatives
     exist. The number of draws depends on the duration and the cutoff, not on the sampling rate.
     """
+    # Longer than the recording: no curve repeats itself in it.
     duration = 2.0 * (time[-1] - time[0]) + 1.0
     frequency = np.arange(1, int(np.ceil(3.0 * cutoff * duration)) + 1) / duration
     weight = np.exp(-((frequency / cutoff) ** 2))
+    # Cosine and sine together have the variance weight² at any time.
     weight /= np.sqrt(np.sum(weight**2))
     cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
     phase = 2 * np.pi * np.outer(time, frequency)
@@ -127,6 +129,7 @@ def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd
     rng = stream(seed, "proportions")
     mean = virtual_people()["lengths"][subject.sex] | virtual_people()["breadths"]
     size = {name: fraction * subject.stature * (1 + length_sd * rng.normal()) for name, fraction in mean.items()}
+    # One factor for the whole chain.
     stretch = subject.stature / sum(size[name] for name in UPRIGHT_CHAIN)
     size |= {name: size[name] * stretch for name in UPRIGHT_CHAIN} | {"stature": subject.stature}
     return Proportions(size, centre_sd * rng.normal(size=(16, 3)), tilt_sd * rng.normal(size=(16, 3)))
@@ -290,5 +293,6 @@ def glue_markers(size: Proportions, person_seed: int, session_seed: int, *, erro
     """
     names, segments, places = ideal_places(size)
     person, day = stream(person_seed, "anatomy of landmarks"), stream(person_seed, "placement", str(session_seed))
+    # Half the variance each.
     shift = np.sqrt(0.5) * (person.normal(size=places.shape) + day.normal(size=places.shape))
     return SegmentMarkers(names, segments, places + error * SKIN_PLANE * shift, np.ones(len(names)))

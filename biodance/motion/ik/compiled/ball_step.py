@@ -51,6 +51,7 @@ def exponential(x, y, z):
 @compiled
 def _near_to(angle, middle):
     """Return ``angle`` plus full turns, within half a turn of ``middle``."""
+    # floor(x + 1/2): the number of full turns nearest to the difference.
     return angle - _TURN * np.floor((angle - middle) / _TURN + 0.5)
 
 
@@ -105,10 +106,12 @@ def hold(rotation, sign, k, lower, upper, out):
         one, two = two, one
     angles, overlap = np.zeros(3), np.empty(4)
     angles[k] = min(max(out[k], lower[k]), upper[k])
+    # Angles 0 or pi have half angles 0 or pi / 2: each corner is one coefficient of the bilinear form.
     for corner in range(4):
         angles[one], angles[two] = (np.pi if corner >= 2 else 0.0), (np.pi if corner % 2 else 0.0)
         x, y, z, w = _quaternion_of(sign, angles[0], angles[1], angles[2])
         overlap[corner] = x * rotation[0] + y * rotation[1] + z * rotation[2] + w * rotation[3]
+    # The sum of the half angles and their difference maximise one cosine each.
     total = np.arctan2(overlap[2] + overlap[1], overlap[0] - overlap[3])
     apart = np.arctan2(overlap[2] - overlap[1], overlap[0] + overlap[3])
     out[k] = angles[k]
@@ -123,6 +126,7 @@ def turned(angles, step, sign, lower, upper, out):
 
     The rotation vector is written along the three axes in the frame of the first joint, after its angle.
     """
+    # Cosine of the second angle: axes 1 and 3 are parallel where it is zero.
     tilt = np.cos(angles[1])
     if tilt > _UPRIGHT and step[0] * step[0] + step[1] * step[1] + step[2] * step[2] < _SMALL * _SMALL:
         out[1], out[2] = angles[1] + step[1], angles[2] + step[2] / tilt
@@ -132,6 +136,7 @@ def turned(angles, step, sign, lower, upper, out):
             == 0
         ):
             return False
+    # The step from the frame after the first angle to that before it.
     sine, cosine = np.sin(sign * angles[0]), np.cos(sign * angles[0])
     still = exponential(
         sign * step[0], sign * (cosine * step[1] - sine * step[2]), sign * (sine * step[1] + cosine * step[2])
@@ -184,6 +189,7 @@ def _slope_at(before, at, after, one, two):
     left, right = (at - before) / one, (after - at) / two
     if left * right <= 0:
         return 0.0
+    # Uneven intervals: the slope before has the weight 2 h_after + h_before.
     first, second = 2 * two + one, two + 2 * one
     return (first + second) / (first / left + second / right)
 
@@ -193,6 +199,7 @@ def smooth_at(known, values, k, frame, out):
     """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between ``known`` k and k + 1."""
     last, width = known.shape[0] - 1, float(known[k + 1] - known[k])
     share = (frame - known[k]) / width
+    # Hermite's basis: values, then slopes times the width.
     h0, h1 = (1 + 2 * share) * (1 - share) ** 2, share * share * (3 - 2 * share)
     d0, d1 = width * share * (1 - share) ** 2, -width * share * share * (1 - share)
     for c in range(values.shape[1]):
@@ -219,6 +226,7 @@ def _posture_of(chain, smooth, near, single, q):
     groups = chain.ball.shape[0]
     for b in range(groups):
         x, y, z, w = smooth[c + b], smooth[c + groups + b], smooth[c + 2 * groups + b], smooth[c + 3 * groups + b]
+        # Parts of a quaternion lie a number of balls apart: x of all, y of all ...
         over, j = 1 / np.sqrt(x * x + y * y + z * z + w * w), chain.ball[b]
         turn = (x * over, y * over, z * over, w * over)
         place = slice(first + j, first + j + 3)

@@ -89,11 +89,13 @@ def _rotation_vector(a, b, out):
     trace = 0.0
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
+        # (R - R')/2 as a vector is sin(angle) times the axis; the elements of R = a b' that it needs.
         plus = a[j, 0] * b[i, 0] + a[j, 1] * b[i, 1] + a[j, 2] * b[i, 2]
         minus = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
         out[k] = 0.5 * (plus - minus)
         trace += a[k, 0] * b[k, 0] + a[k, 1] * b[k, 1] + a[k, 2] * b[k, 2]
     sine = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+    # angle / sine; at zero angle both are alike.
     longer = np.arctan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-9 else 1.0
     for k in range(3):
         out[k] *= longer
@@ -108,6 +110,7 @@ def _place_foot(leg, angles, s):
             s.turn[i, j] = 1.0 if i == j else 0.0
     for k in range(6):
         p, e = leg.translation[k], leg.axis[k]
+        # Parent's turn times the joint's own placement, before its angle turns about the axis.
         _multiply(s.turn, leg.rotation[k], s.a)
         for i in range(3):
             s.place[i] += s.turn[i, 0] * p[0] + s.turn[i, 1] * p[1] + s.turn[i, 2] * p[2]
@@ -120,6 +123,7 @@ def _place_foot(leg, angles, s):
 @compiled
 def _solve_step(s, damping):
     """Fill the step: (J'J + damping) step = J' gap, by Cholesky's factor in ``normal``."""
+    # Row by row of L L' = J'J + damping; the forward substitution of the right side goes along.
     for i in range(6):
         for j in range(i + 1):
             total = damping if i == j else 0.0
@@ -149,6 +153,7 @@ def _reach_for(leg, angles, turn, place, rounds, s):
         _rotation_vector(turn, s.turn, s.w)
         square = 0.0
         for i in range(3):
+            # Distances in leg lengths beside angles in rad: one measure for both.
             s.gap[i], s.gap[3 + i] = (place[i] - s.place[i]) / leg.size, s.w[i]
             square += s.gap[i] * s.gap[i] + s.w[i] * s.w[i]
         away = np.sqrt(square)
@@ -157,10 +162,12 @@ def _reach_for(leg, angles, turn, place, rounds, s):
         for k in range(6):
             for i in range(3):
                 m, n = (i + 1) % 3, (i + 2) % 3
+                # a x (foot - origin): how the foot moves with the angle.
                 lever = s.direction[k, m] * (s.place[n] - s.origin[k, n]) - s.direction[k, n] * (
                     s.place[m] - s.origin[k, m]
                 )
                 s.jacobian[i, k], s.jacobian[3 + i, k] = lever / leg.size, s.direction[k, i]
+        # Levenberg's damping in proportion to the squared distance: strong far away, and quadratic convergence near.
         _solve_step(s, _DAMPING[0] * square + _DAMPING[1])
         longest = _LONGEST
         for k in range(6):
@@ -185,6 +192,7 @@ def lead(leg, known, angles, turn, place, s):
         short, long = short + s.begin[i] ** 2, long + (place[i] - leg.hip[i]) ** 2
         for j in range(3):
             s.first[i, j] = s.turn[i, j]
+    # Turn about a fixed axis and distance to the hip in even shares; direction along the chord.
     for k in range(1, _LEADS):
         share, length = k / _LEADS, 0.0
         _rotation_about(x, y, z, share * size, s.b)
@@ -192,6 +200,7 @@ def lead(leg, known, angles, turn, place, s):
         for i in range(3):
             s.spot[i] = (1.0 - share) * s.begin[i] + share * (place[i] - leg.hip[i])
             length += s.spot[i] ** 2
+        # The chord is shorter than its ends: stretched so that the leg never has to shorten on the way.
         longer = ((1.0 - share) * np.sqrt(short) + share * np.sqrt(long)) / np.sqrt(length)
         for i in range(3):
             s.spot[i] = leg.hip[i] + longer * s.spot[i]
@@ -204,6 +213,7 @@ def close_leg(leg, known, turn, place, s, out, away):
     """Fill ``out`` (T, 6) with the angles for foot poses ``turn``, ``place``, ``away`` (T,) how far it stays."""
     for t in range(len(place)):
         change = np.inf
+        # Only a closed neighbour is a start.
         if t and away[t - 1] < _CLOSED:
             for k in range(6):
                 out[t, k] = out[t - 1, k]

@@ -168,7 +168,7 @@ def add_up(chain, xyz, weight, q, at):
         pz = o[2] + R[2, 0] * local[0] + R[2, 1] * local[1] + R[2, 2] * local[2]
         mx, my, mz = xyz[k, 0] - x, xyz[k, 1] - y, xyz[k, 2] - z
         cost += 0.5 * w * ((px - mx) ** 2 + (py - my) ** 2 + (pz - mz) ** 2)
-        px, py, pz = w * px, w * py, w * pz
+        px, py, pz = w * px, w * py, w * pz  # below: sums of w, w p, w m and, row by row, w p m'
         T[0] += w
         T[1], T[2], T[3] = T[1] + px, T[2] + py, T[3] + pz
         T[4], T[5], T[6] = T[4] + w * mx, T[5] + w * my, T[6] + w * mz
@@ -235,6 +235,7 @@ def hessian(chain, at, seen, cross):
             for d in range(3):
                 H[c, d] = S[0] if c == d else 0.0
                 H[3 + c, d] = 0.0
+                # Turns do not commute: second derivatives by the rotation vector are the symmetric part.
                 H[3 + c, 3 + d] = (trace if c == d else 0.0) - 0.5 * (M[3 * c + d] + M[3 * d + c])
         H[3, 1], H[3, 2], H[4, 0], H[4, 2], H[5, 0], H[5, 1] = -S[3], S[2], S[3], -S[1], -S[2], S[1]
     for j in range(chain.parent.shape[0]):
@@ -268,7 +269,7 @@ def factorise(chain, at, held, damping):
     H, path, depth = at.factor, chain.path, chain.depth
     for k in range(held.shape[0]):
         weight, lever = _scale_of(chain, at, k)
-        H[k, depth[k]] += damping * weight * lever * lever
+        H[k, depth[k]] += damping * weight * lever * lever  # Levenberg-Marquardt, in units of each coordinate
         for d in range(depth[k] + 1):
             if held[k] or held[path[k, d]]:
                 H[k, d] = 1.0 if d == depth[k] else 0.0
@@ -279,11 +280,11 @@ def factorise(chain, at, held, damping):
             return False
         over = 1.0 / pivot
         for d in range(depth[k] - 1, -1, -1):
-            factor, above = row[d] * over, H[path[k, d]]
+            factor, above = row[d] * over, H[path[k, d]]  # L_kd = H_kd / D_k
             for e in range(d + 1):
-                above[e] -= factor * row[e]
+                above[e] -= factor * row[e]  # Schur complement
             row[d] = factor
-        row[depth[k]] = over
+        row[depth[k]] = over  # 1 / D_k
     return True
 
 
@@ -295,11 +296,11 @@ def step_from(chain, at, g, held, x):
         x[k] = 0.0 if held[k] else -g[k]
     for k in range(g.shape[0] - 1, -1, -1):
         for d in range(depth[k]):
-            x[path[k, d]] -= H[k, d] * x[k]
+            x[path[k, d]] -= H[k, d] * x[k]  # L' z = -g, from the tips
     for k in range(g.shape[0]):
-        x[k] *= H[k, depth[k]]
+        x[k] *= H[k, depth[k]]  # y = D^-1 z
         for d in range(depth[k]):
-            x[k] -= H[k, d] * x[path[k, d]]
+            x[k] -= H[k, d] * x[path[k, d]]  # L x = y, from the root
 
 
 _STEP_LIMIT = 0.7
@@ -342,6 +343,7 @@ def turn_balls(chain, at, g, held, cardan, turning):
         i = chain.roots + j
         turning[b] = not (cardan[b] or held[i] or held[i + 1] or held[i + 2])
         if turning[b]:
+            # Third axis at zero second angle, in the frame of the first joint: square to both others.
             R, e = at.rotation[j + 1], chain.axis[j + 2]
             x = R[0, 0] * e[0] + R[0, 1] * e[1] + R[0, 2] * e[2]
             y = R[1, 0] * e[0] + R[1, 1] * e[1] + R[1, 2] * e[2]
@@ -404,7 +406,7 @@ def _centred_squares(chain, xyz, weight):
             mean[c] += weight[k] * xyz[k, c]
             square += weight[k] * xyz[k, c] * xyz[k, c]
     if chain.roots and total > 0:
-        square -= (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2) / total
+        square -= (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2) / total  # sum w |x - mean|²
     return square
 
 
@@ -451,7 +453,7 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
                 break
             newton = slope[f] < _NEAR and not bent
             if newton:
-                hessian(chain, at, at.below[:, 4:7], at.below[:, 7:])
+                hessian(chain, at, at.below[:, 4:7], at.below[:, 7:])  # A, M: exact second derivatives
             else:
                 add_up_model(chain, w, at)
                 hessian(chain, at, at.below[:, 1:4], at.model[:, 0:9])  # sliced: the same type as above
@@ -476,7 +478,7 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
                     now[i] = new[i]
                 bent = False
             else:
-                if (convex or not newton) and not retreat:
+                if (convex or not newton) and not retreat:  # not convex: Gauss-Newton next, undamped
                     damping = max(10 * damping, _FIRST_DAMPING)
                 bent = bent or not convex
                 place(chain, now, at)

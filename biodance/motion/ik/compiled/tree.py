@@ -110,7 +110,7 @@ def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
             across, lifted, swung = _cross_of(w, spin), _cross_of(dw, arm), _cross_of(w, _cross_of(w, arm))
             for c in range(3):
                 moved[0, t, j, c] = w[c] + spin[c] * rate[t, j]
-                moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]
+                moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]  # the axis turns with w
                 moved[2, t, j, c] = a[c] + lifted[c] + swung[c]
 
 
@@ -127,6 +127,7 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
             _apply_transposed(R, omega[t, s], w)
             _apply_transposed(R, alpha[t, s], dw)
             square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+            # A = [dw]x + [w]x²: the force of the first moments is R A h.
             for c in range(3):
                 for d in range(3):
                     A[c, d] = w[c] * w[d] - (square if c == d else 0.0)
@@ -134,7 +135,7 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
             A[1, 0], A[2, 0], A[2, 1] = A[1, 0] + dw[2], A[2, 0] - dw[1], A[2, 1] + dw[0]
             _multiply(R, A, first)
             _inertia_columns(w, L)
-            for d in range(6):
+            for d in range(6):  # w x (I w), per element of I
                 B[0, d] = w[1] * L[2, d] - w[2] * L[1, d]
                 B[1, d] = w[2] * L[0, d] - w[0] * L[2, d]
                 B[2, d] = w[0] * L[1, d] - w[1] * L[0, d]
@@ -147,11 +148,11 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
                     own[c, 1 + d] = first[c, d]
                 for d in range(6):
                     own[3 + c, 4 + d] = second[c, d]
-            _add_product(p, f, own[3:, 0])
+            _add_product(p, f, own[3:, 0])  # mass: p x (a - g)
             for d in range(3):
                 column[:] = 0.0
-                _add_product(p, first[:, d], column)
-                _add_product(R[:, d], f, column)
+                _add_product(p, first[:, d], column)  # p x (R A e_d)
+                _add_product(R[:, d], f, column)  # (R e_d) x (a - g)
                 for c in range(3):
                     own[3 + c, 1 + d] = column[c]
 
@@ -257,7 +258,7 @@ def fill_tangent(hangs, joints, com, place, turn, tangent):
             if roots:
                 arm = at[0] - root[t, 0], at[1] - root[t, 1], at[2] - root[t, 2]
                 for f in range(P.shape[0]):
-                    across = _cross_of(arm, _three_of(P[f]))
+                    across = _cross_of(arm, _three_of(P[f]))  # P . (e x arm) = e . (arm x P)
                     for c in range(3):
                         tangent[t, f, c] += P[f, c]
                         tangent[t, f, 3 + c] += D[f, c] + across[c]
