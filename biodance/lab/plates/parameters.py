@@ -8,7 +8,7 @@ Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -95,19 +95,11 @@ class PlateParameters:
         return f"plate{self.number}"
 
 
-class _DeclaredPlates(NamedTuple):
-    """The ``plates`` that a file and session.toml describe, the reason by number why others are ``refused``, what a
-    person should look at, what was decided without doubt.
-    """
-
-    plates: tuple[PlateParameters, ...]
-    refused: Mapping[int, str]
-    warnings: tuple[str, ...]
-    history: tuple[str, ...]
-
-
-def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array) -> _DeclaredPlates:
-    """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used.
+def declared_plates(
+    raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array
+) -> tuple[list[PlateParameters], dict[int, str], tuple[str, ...], tuple[str, ...]]:
+    """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used; the
+    reason by number why others are refused; what a person should look at; what was decided without doubt.
 
     ``told`` by the plate's name; ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the
     lab.
@@ -125,14 +117,14 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     lacks = lacks if raw.analog.shape[0] else "holds no analog samples"
     if numbers and lacks:
         declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
-        return _DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
+        return [], {}, (*warnings, f"{declared} Export it with the analog data."), history
     plates, refused = [], {}
     for number in numbers:
         try:
             plates.append(plate_parameters(raw, number, more.get(number), metres=metres, turn=turn))
         except TrialRefused as error:
             refused[number] = str(error)
-    return _DeclaredPlates(tuple(plates), refused, warnings, history)
+    return plates, refused, warnings, history
 
 
 def _without_channels(told: Mapping[int, ToldPlate], count: int) -> tuple[str, ...]:

@@ -80,14 +80,6 @@ def head_text(head: bytes) -> str:
         return ""
 
 
-def _without_origin(trial: Trial) -> Trial:
-    """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
-    if trial.markers is None:
-        return trial
-    xyz, said = unseen_at_origin(trial.markers.xyz)
-    return replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said)) if said else trial
-
-
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 _HEAD = 8192  # Bytes of a file that are looked at to find its reader
 
@@ -199,7 +191,11 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(_without_origin(_read(reader, path, role, subject, told)))
+        trial = _read(reader, path, role, subject, told)
+        if trial.markers is not None:
+            xyz, said = unseen_at_origin(trial.markers.xyz)
+            trial = replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said))
+        trial = without_frozen(trial)
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise

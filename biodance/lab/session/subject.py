@@ -56,14 +56,18 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     """
     at = _places(trial)
     ankles = _mean(at, tuple(f"{side}_ankle_lateral" for side in SIDES))
-    rise, doubt = _shoulder_rise(at)
+    # the share of the stature by which lifted arms raise the acromion markers, known to half
+    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
+    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
+    angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
+    rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
         height = _mean(at, landmarks)[2] - ankles[2]
         if math.isfinite(height) and height > 0:
             lifted = landmarks[0].endswith("acromion")
             told.append(height / (share + rise * lifted))
-            spread.append(math.hypot(sd, doubt / share * lifted))
+            spread.append(math.hypot(sd, rise / 2 / share * lifted))
             names.append(name)
     if not told:
         return math.nan, math.nan, ""
@@ -112,15 +116,6 @@ def _places(trial: Trial) -> Mapping[str, Array]:
 def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
     """Return the middle (3,) m of some landmarks; NaN if one of them was not recorded."""
     return np.mean([at.get(name, np.full(3, np.nan)) for name in landmarks], axis=0)
-
-
-def _shoulder_rise(at: Mapping[str, Array]) -> tuple[float, float]:
-    """Return by which share of the stature lifted arms raise the acromion markers, and its standard deviation."""
-    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
-    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
-    angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
-    rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
-    return rise, rise / 2
 
 
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})

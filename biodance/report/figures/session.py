@@ -16,7 +16,7 @@ from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures import vector as svg
 from biodance.report.figures.style import SIDE_COLOURS
-from biodance.report.wording import format_number, millimetres
+from biodance.report.wording import millimetres
 
 _LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
 """N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
@@ -149,11 +149,6 @@ def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None 
     about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
     cells = _channels(curves, one.measured.value, one.use)
     return svg.CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
-
-
-def place_words(about: Array) -> str:
-    """Return a point of the lab in words: x and y in m."""
-    return f"x {format_number(about[0], 2)} m, y {format_number(about[1], 2)} m"
 
 
 FORCE_SCALE = 0.001

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -74,20 +75,10 @@ def _camera(
     plotter.camera.view_angle = 24.0
 
 
-def _png(plotter: Any) -> bytes:
-    from io import BytesIO
-
-    from PIL import Image
-
-    picture = BytesIO()
-    Image.fromarray(plotter.screenshot(return_img=True)).save(picture, "PNG", optimize=True)
-    plotter.close()
-    return picture.getvalue()
-
-
 def _draw_sheet(stills: Sequence[Still]) -> bytes:
     """Return the PNG of many postures, each from the front, right, with its title, all to one scale."""
     import pyvista as pv
+    from PIL import Image
 
     columns = min(_COLUMNS, len(stills))
     rows = -(-len(stills) // columns)
@@ -100,7 +91,10 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
         _body(plotter, still)
         plotter.add_text(still.trial, position="upper_left", font_size=8, color=BLACK)
         _camera(plotter, still, (12.0, -50.0), distance=5.8, height=height)
-    return _png(plotter)
+    picture = BytesIO()
+    Image.fromarray(plotter.screenshot(return_img=True)).save(picture, "PNG", optimize=True)
+    plotter.close()
+    return picture.getvalue()
 
 
 if __name__ == "__main__":
