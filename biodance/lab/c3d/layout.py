@@ -153,7 +153,8 @@ def read_layout(content: bytes, header: Header, parameters: Parameters, where: s
             f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not "
             f"known. {RESAVE}"
         )
-    floating, word = header.scale < 0, 4 if header.scale < 0 else 2
+    floating = header.scale < 0
+    word = 4 if floating else 2
     start, points, channels, samples, frames = _counts(content, header, parameters, word, where, notes, remarks)
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))

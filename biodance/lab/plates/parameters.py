@@ -144,7 +144,13 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
     used = _numbers(group, "USED")
     if not used.size:
         if not types and not _numbers(group, "CHANNEL").size:
-            return 0, _misnamed(raw)
+            # another name of the group is damage, which must not pass in silence
+            other = [name for name, held in raw.parameters.items() if {"CORNERS", "ORIGIN", "CHANNEL"} <= held.keys()]
+            said = (
+                f"The group {', '.join(other[:1])} holds CORNERS, ORIGIN and CHANNEL of force plates but is not called "
+                f"FORCE_PLATFORM: no plate was read. Rename the group, or copy the file again from its source."
+            )
+            return 0, (said,) if other and "FORCE_PLATFORM" not in other else ()
         return types, (f"FORCE_PLATFORM:USED is missing; TYPE lists {types} plates, which were read.",)
     declared = int(used[0]) if np.isfinite(used[0]) and 0 <= used[0] <= 255 else 0
     if declared != used[0]:
@@ -155,17 +161,6 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
     if declared < types:
         return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; {declared} were read.",)
     return declared, ()
-
-
-def _misnamed(raw: RawC3d) -> tuple[str, ...]:
-    """Say which group holds force plates under another name: damage, which must not pass in silence."""
-    other = [name for name, group in raw.parameters.items() if {"CORNERS", "ORIGIN", "CHANNEL"} <= group.keys()]
-    if not other or "FORCE_PLATFORM" in other:
-        return ()
-    return (
-        f"The group {other[0]} holds CORNERS, ORIGIN and CHANNEL of force plates but is not called FORCE_PLATFORM: no "
-        f"plate was read. Rename the group, or copy the file again from its source.",
-    )
 
 
 def plate_parameters(

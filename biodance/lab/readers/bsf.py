@@ -82,7 +82,16 @@ def _parse_bsf(content: bytes, path: Path) -> tuple[Any, list[_BsfPlate], int]:
                 f"instead."
             )
         block = data[:, first[i] : first[i] + 6].astype(float)
-        factor = _counts_to_pounds(header, i + 1, path) if version == 100 else np.ones(6)
+        factor = np.ones(6)
+        if version == 100:  # lbf, in·lbf a count
+            told = ("sensitivity", "gain", "excitation", "counts_per_volt")
+            product = np.prod([header[name][:6].astype(float) for name in told], axis=0)
+            if not ((np.abs(product) <= LARGEST_NUMBER**2) & (np.abs(product) >= 1 / LARGEST_NUMBER)).all():
+                raise FileRefused(
+                    f"{path}: plate {i + 1} holds ADC counts but a calibration value is 0 or no number. Enter the "
+                    f"calibration in NetForce and save again."
+                )
+            factor = _MICROVOLT / product
         model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
         size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
         offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
@@ -156,19 +165,6 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
         at = int(np.argwhere(wrong)[0][0]) + 1
         raise FileRefused(f"{path}: sample {at} is not a number that a plate records. Export it again.")
     return data
-
-
-def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
-    """Return (6,) lbf, in·lbf a count: 1e6 / (sensitivity * gain * excitation * counts per volt)."""
-    product = np.prod(
-        [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
-    )
-    if not (np.abs(product) <= LARGEST_NUMBER**2).all() or (np.abs(product) < 1 / LARGEST_NUMBER).any():
-        raise FileRefused(
-            f"{path}: plate {number} holds ADC counts but a calibration value is 0 or no number. Enter the "
-            f"calibration in NetForce and save again."
-        )
-    return _MICROVOLT / product
 
 
 _LIGHTEST, _HEAVIEST = 10.0, 300.0  # kg

@@ -163,15 +163,6 @@ VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 _MM = 1000.0
 
 
-def _screen(still: Still, elevation: float, azimuth: float) -> Array:
-    """Return the matrix (3, 3) that turns lab points into mm to the right, down and towards the eye."""
-    e, a = np.radians(elevation), np.radians(azimuth) + np.arctan2(still.forward[1], still.forward[0])
-    right = [-np.sin(a), np.cos(a), 0.0]
-    up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
-    eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
-    return _MM * np.array([right, [-v for v in up], eye]).T
-
-
 def _rounded(box: Array) -> Array:
     """Return points (n, 3) of the rounded solid that fills a ``box`` (2, 3) m."""
     polar, around = np.meshgrid(np.linspace(0.0, np.pi, 15), np.linspace(0.0, 2 * np.pi, 28, endpoint=False))
@@ -236,7 +227,11 @@ def still_figure(still: Still) -> str:
     """Return the body, its markers, the plates and the ground force from two sides as HTML, both to one scale."""
     drawn = []
     for elevation, azimuth, title in VIEWS:
-        screen = _screen(still, elevation, azimuth)
+        # the matrix that turns lab points into mm to the right, down and towards the eye
+        e, a = np.radians(elevation), np.radians(azimuth) + np.arctan2(still.forward[1], still.forward[0])
+        down = [np.sin(e) * np.cos(a), np.sin(e) * np.sin(a), -np.cos(e)]
+        eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+        screen = _MM * np.array([[-np.sin(a), np.cos(a), 0.0], down, eye]).T
         parts = [
             _line((corners[[0, 1, 2, 3, 0]] @ screen)[:, :2], f'stroke="{GREY}" stroke-width="6"')
             for corners in still.plates
