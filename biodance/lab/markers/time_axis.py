@@ -2,7 +2,7 @@
 own stamps, and what that costs is said. One place for tables, .trc and .mot; C3D holds a rate and no stamps.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -39,11 +39,6 @@ class TimeAxis:
     time: Array
     sampled: bool
     said: str = ""
-
-    def from_zero(self) -> "TimeAxis":
-        """Return the same axis with its first time at 0."""
-        first = self.time[0] if self.time.size else 0.0
-        return replace(self, stamps=self.stamps - first, time=self.time - first)
 
     def at(self, values: Array) -> Array:
         """Return ``values`` (S, ...) on ``time``, by cubic splines between samples that are known; NaN where one of the

@@ -201,8 +201,15 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     if others:
         history.append(f"{others} channels of other instruments were not read.")
     source = Source(path, sha256(content), f"AMTI .bsf {version}", analog_rate=rate)
-    told = (_measurements(main), tuple(history), tuple(warnings))
-    return Trial(path.stem, role, None, tuple(plates), source, "", *told)
+    # the subject's mass (kg) and height (m), where they make sense
+    mass, height = float(main["weight"]), float(main["height"])
+    if not int(main["metric"]):
+        mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
+    elif height > 3:
+        height /= 100
+    measures = {"Bodymass": mass} if _LIGHTEST <= mass <= _HEAVIEST else {}
+    measures |= {"Height": height} if 0.5 <= height <= 2.5 else {}
+    return Trial(path.stem, role, None, tuple(plates), source, "", measures, tuple(history), tuple(warnings))
 
 
 def _refuse_nonsense(plate: _BsfPlate, number: int, path: Path) -> None:
@@ -229,14 +236,3 @@ def _placed(plate: _BsfPlate, number: int) -> str:
         f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
         f"says. Check that."
     )
-
-
-def _measurements(main: Any) -> dict[str, float]:
-    """Return the subject's mass (kg) and height (m) from the header where they make sense."""
-    mass, height = float(main["weight"]), float(main["height"])
-    if not int(main["metric"]):
-        mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
-    elif height > 3:
-        height /= 100
-    found = {"Bodymass": mass} if _LIGHTEST <= mass <= _HEAVIEST else {}
-    return found | ({"Height": height} if 0.5 <= height <= 2.5 else {})

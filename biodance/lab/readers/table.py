@@ -293,7 +293,8 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     time_axis(stamps, where=str(path))  # refuses stamps that are none
     rows, lengths, turn = _markers(cells, columns, stamps, path)
     instants, arrived = camera_instants(stamps, rows.xyz)
-    axis, rows = time_axis(instants, where=str(path)).from_zero(), replace(rows, time=instants)
+    axis, rows = time_axis(instants, where=str(path)), replace(rows, time=instants)
+    axis = replace(axis, stamps=axis.stamps - axis.time[0], time=axis.time - axis.time[0])
     loads, weighed = loads_of(columns.plates, cells.labels, cells.units, cells.values)
     known = recognise(rows.names)
     guess = "" if known else guess_set(rows).name
