@@ -87,7 +87,6 @@ ONE_ALGORITHM = {
     "lab/robot.py": "a robot's folder: encoder tables, plates, and which belong together",
     "lab/session/file.py": "session.toml, key by key",
     "lab/session/results_folder.py": "a folder of results that is there whole or not at all, with its manifest",
-    "lab/session/subject.py": "mass, stature, sex and age, by whom each is told and what is worn",
     "motion/contact.py": "which frames are fully measured, and why the others are not",
     "motion/grounded.py": "a robot's joint angles to its motion on the ground, and the plate beside it",
     "motion/ik/compiled/newton.py": "the marker cost of a frame with its derivatives, and its minimum",

@@ -208,6 +208,6 @@ def test_centre_of_pressure_is_unknown_without_load():
     plate = Emulated()
     raw = raw_file([plate], [np.zeros((50, 6))])
     turn = np.eye(3)
-    declared = declared_plates(raw, {}, metres=0.001, turn=turn)
-    ((reading,), _, _) = decode_plates(raw, declared.plates, metres=0.001, turn=turn, mass=None)
+    declared, *_ = declared_plates(raw, {}, metres=0.001, turn=turn)
+    ((reading,), _, _) = decode_plates(raw, declared, metres=0.001, turn=turn, mass=None)
     assert np.isnan(pressure_point(reading)).all()

@@ -62,7 +62,10 @@ def inspect_paths(
                 tell(file.name)
             chosen, told, fault = said.setdefault(file.parent, _said_in(file.parent))
             record = inspect_file(file, subject=subject, markers=worn or chosen, told=told)
-            records.append(_warned(record, fault) if fault else record)
+            if fault and record["status"] != "refused":
+                warnings = [*record["warnings"], fault]
+                record |= {"status": "warning", "reason": warnings[0], "warnings": warnings}
+            records.append(record)
     return records
 
 
@@ -73,14 +76,6 @@ def _said_in(folder: Path) -> tuple[MarkerSet | None, Told, str]:
         return (read_marker_set(said.marker_set) if said.marker_set else None), said.told, ""
     except BiodanceError as error:
         return None, Told(), str(error)
-
-
-def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
-    """Return the record with one more warning."""
-    if record["status"] == "refused":
-        return record
-    warnings = [*record["warnings"], warning]
-    return {**record, "status": "warning", "reason": warnings[0], "warnings": warnings}
 
 
 def inspect_file(

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.markers.signals import Gap, faulty_markers, fill_gaps, report_gaps, without_faults
+from biodance.lab.markers.signals import BRIDGED, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import of_postures
 from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
 from biodance.settings import FilterKind, FilterSettings, GapSettings, Settings
@@ -223,17 +223,13 @@ def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers,
     faults = faulty_markers(markers)
     history += [one.sentence(one.when(markers.time)) for one in faults]
     filled, gaps = fill_gaps(without_faults(markers, faults), segments, short=rules.bridged)
-    return filled, [*history, *_sentences(gaps, markers.time)], warnings
-
-
-def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
-    """Return one sentence for all bridged gaps and one for every other gap."""
-    bridged = sorted({gap.label for gap in gaps if gap.how.startswith("bridged")})
-    count = sum(gap.how.startswith("bridged") for gap in gaps)
-    said = [f"Short gaps bridged by a spline ({count}): {', '.join(bridged)}."] if bridged else []
-    others = [gap for gap in gaps if not gap.how.startswith("bridged")]
-    said += [f"{gap.label} {time[gap.start]:.2f} to {time[gap.stop - 1]:.2f} s {gap.how}." for gap in others]
-    return said or ["No marker has a gap."]
+    # one sentence for all bridged gaps and one for every other gap
+    time, bridged = markers.time, [gap.label for gap in gaps if gap.how is BRIDGED]
+    said = [f"Short gaps bridged by a spline ({len(bridged)}): {', '.join(sorted(set(bridged)))}."] * bool(bridged)
+    for gap in gaps:
+        if gap.how is not BRIDGED:
+            said.append(f"{gap.label} {time[gap.start]:.2f} to {time[gap.stop - 1]:.2f} s {gap.how}.")
+    return filled, [*history, *(said or ["No marker has a gap."])], warnings
 
 
 def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -> Plate:

@@ -68,8 +68,7 @@ def read_mot(path: str | Path) -> TimeTable:
         there are not three, a time that does not increase.
     """
     path = Path(path)
-    parts = _parts(path)
-    header, labels, body = parts.header, parts.labels, parts.body
+    header, labels, body, vectors, history = _parts(path)
     if not body:
         raise FileRefused(f"{path}: holds no row of numbers. Export it again.")
     table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
@@ -81,14 +80,13 @@ def read_mot(path: str | Path) -> TimeTable:
     differs = announced.isdigit() and int(announced) != len(table)
     warnings = (f"The header announces {announced} rows, the file holds {len(table)}.",) if differs else ()
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1")
-    return TimeTable(
-        header.get("", path.stem), parts.labels[1:], time, table[:, 1:], degrees, parts.vectors, parts.history, warnings
-    )
+    name = header.get("", path.stem)
+    return TimeTable(name, labels[1:], time, table[:, 1:], degrees, vectors, history, warnings)
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
     """Return the column labels of a .mot or .sto file without ``time``; FileRefused as of `read_mot`."""
-    return _parts(Path(path)).labels[1:]
+    return _parts(Path(path))[1][1:]
 
 
 def write_mot(path: str | Path, table: TimeTable, *, notes: tuple[str, ...] = ()) -> Path:
@@ -117,20 +115,12 @@ def write_mot(path: str | Path, table: TimeTable, *, notes: tuple[str, ...] = ()
     return write_whole(path, ("\n".join([*header, *rows]) + "\n").encode())
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """``header`` (lower-case keys, the table's name under ""), column ``labels``, numbered rows (``body``), ``vectors``
-    as of a `TimeTable`, ``history``.
+def _parts(
+    path: Path,
+) -> tuple[dict[str, str], tuple[str, ...], list[tuple[int, str]], tuple[str, ...], tuple[str, ...]]:
+    """Return the header (lower-case keys, the table's name under ""), column labels, numbered rows, vectors as of a
+    `TimeTable`, and history.
     """
-
-    header: dict[str, str]
-    labels: tuple[str, ...]
-    body: list[tuple[int, str]]
-    vectors: tuple[str, ...]
-    history: tuple[str, ...]
-
-
-def _parts(path: Path) -> _Parts:
     text, commas = with_points(read_text(path))
     rows = text.splitlines()
     start = next((i for i, row in enumerate(rows[:_LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
@@ -147,7 +137,7 @@ def _parts(path: Path) -> _Parts:
         raise FileRefused(f"{path}: the first column is {found}, it must be 'time'. Export it again.")
     vectors = _vectors(labels, body[1][1], path) if len(body) > 1 else ()
     history = [*[COMMAS_READ] * commas, *[_VECTORS_READ] * bool(vectors)]
-    return _Parts(header, _columns(labels, vectors), body[1:], vectors, tuple(history))
+    return header, _columns(labels, vectors), body[1:], vectors, tuple(history)
 
 
 _VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."

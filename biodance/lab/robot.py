@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
@@ -254,8 +255,16 @@ def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[P
 def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path, Path]]]:
     """Return the trials of a folder without a word about them."""
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
-    tables = [path for path in files if path.suffix.lower() in _ENCODER_TABLES and _names_joints(path, joints)]
-    plates = [path for path in files if path not in tables and path.name != _FILE and _is_recording(path)]
+    tables, plates = list[Path](), list[Path]()
+    for path in files:
+        with suppress(BiodanceError):
+            is_table = path.suffix.lower() in _ENCODER_TABLES
+            if is_table and joints & set(read_cells(read_bytes(path), path, least=2).labels):
+                tables.append(path)
+                continue
+        with suppress(BiodanceError):
+            known = sniffed(path, read_head(path)) is not None or path.suffix.lower() in (".c3d", ".bsf")
+            plates += [path] * (known and path.name != _FILE)
     if not tables or not plates:
         lacks = "table with encoder columns named as the robot's joints" if not tables else "force plate file"
         raise SessionRefused(
@@ -282,20 +291,6 @@ def _plate_of(table: Path, plates: list[Path]) -> Path:
 
 def _stem(path: Path) -> str:
     return _ENDS.sub("", path.stem) or path.stem
-
-
-def _names_joints(path: Path, joints: set[str]) -> bool:
-    try:
-        return bool(joints & set(read_cells(read_bytes(path), path, least=2).labels))
-    except BiodanceError:
-        return False
-
-
-def _is_recording(path: Path) -> bool:
-    try:
-        return sniffed(path, read_head(path)) is not None or path.suffix.lower() in (".c3d", ".bsf")
-    except BiodanceError:
-        return False
 
 
 def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: dict[str, str]) -> RobotTrial:

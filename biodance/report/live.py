@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping
 from html import escape as escape_html
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from threading import Event, Lock, Thread
 from types import TracebackType
 from typing import Any
@@ -23,6 +22,7 @@ from biodance.errors import BiodanceError
 from biodance.pipeline.asked import asked_posture
 from biodance.pipeline.live import LiveResult, LiveState
 from biodance.report.dance import mannequin_svg
+from biodance.report.pages.template import template_text
 from biodance.report.tables.identification import ASKED
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_table
@@ -183,17 +183,11 @@ class LivePage:
         with self._lock:
             self._said.update(said)
 
-    def _answer(self, path: str) -> tuple[str, bytes] | None:
-        """Return type and body of what is asked for; None where there is nothing."""
-        if path == "/":
-            page = files("biodance.report") / "templates" / "live.html"
-            return "text/html; charset=utf-8", page.read_bytes()
-        if path != "/state.json":
-            return None
+    def _state(self) -> bytes:
+        """Return what is said now, to a page that watches."""
         self._watched = True
         with self._lock:
-            text = json.dumps(self._said)
-        return "application/json", text.encode()
+            return json.dumps(self._said).encode()
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         page = self
@@ -202,10 +196,13 @@ class LivePage:
             timeout = _PATIENCE
 
             def do_GET(self) -> None:
-                host = self.headers.get("Host", "").rpartition(":")[0]
-                found = page._answer(self.path) if host in (_LOOPBACK, "localhost") else None
-                kind, body = found or ("text/plain", b"There is nothing here.")
-                self.send_response(200 if found else 404)
+                asked = self.path if self.headers.get("Host", "").rpartition(":")[0] in (_LOOPBACK, "localhost") else ""
+                code, kind, body = 404, "text/plain", b"There is nothing here."
+                if asked == "/":
+                    code, kind, body = 200, "text/html; charset=utf-8", template_text("live.html").encode()
+                elif asked == "/state.json":
+                    code, kind, body = 200, "application/json", page._state()
+                self.send_response(code)
                 for name, value in {"Content-Type": kind, "Content-Length": str(len(body)), **_HEADERS}.items():
                     self.send_header(name, value)
                 self.end_headers()

@@ -63,20 +63,10 @@ def robot_document(result: RobotResult) -> Row:
 
 def write_robot(result: RobotResult, folder: Path) -> Row:
     """Write ``report.html``, ``results.json`` and, where a body was found, ``body.json``; return the numbers."""
-    numbers = robot_document(result)
-    content = {PAGE: _page(result, numbers)}
-    done = result.identified.identification
-    if done.status == "solved":
-        content[BODY_FILE] = body_text(
-            done.identified, f"Recording {result.recording.folder.name} of {result.body.name}."
-        )
-    return write_results(folder, numbers, content)
-
-
-def _page(result: RobotResult, numbers: Row) -> str:
     from markupsafe import Markup
 
-    return render(
+    numbers = robot_document(result)
+    page = render(
         "robot.html.j2",
         scripts=[template_text("curves.js")],
         model=result.body.name,
@@ -88,6 +78,13 @@ def _page(result: RobotResult, numbers: Row) -> str:
         ],
         section=Markup(identification_section(result.identified)),
     )
+    content = {PAGE: page}
+    done = result.identified.identification
+    if done.status == "solved":
+        content[BODY_FILE] = body_text(
+            done.identified, f"Recording {result.recording.folder.name} of {result.body.name}."
+        )
+    return write_results(folder, numbers, content)
 
 
 def print_robot_diagnosis(found: Row, console: Console) -> None:

@@ -242,11 +242,13 @@ def _print_judged(rows: Sequence[Row], console: Console) -> None:
         print_line(console, f"  {', '.join(trials)}: {reason}")
 
 
-_PART = Schema("", shown="part: {name} | state: {state} | what: {text}")
+_PART = Schema(
+    "name text",
+    {"state": lambda one: "ok" if one.works else "MISSING" if one.needed else "not here (optional)"},
+    "part: {name} | state: {state} | what: {text}",
+)
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:
     """Print one line a finding of the doctor."""
-    states = ("ok" if one.works else "MISSING" if one.needed else "not here (optional)" for one in findings)
-    rows = ({"name": one.name, "state": state, "text": one.text} for one, state in zip(findings, states, strict=True))
-    print_table(_PART, rows, console)
+    print_table(_PART, _PART.rows(findings), console)

@@ -4,6 +4,7 @@ quantity), and what `biodance compare` prints.
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
 from biodance.report.files import csv_text, write_results
 from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.tables.diagnosis import ATTENTION_ROW
 from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.report.terminal import print_line, print_table
@@ -43,7 +45,6 @@ _UNTESTED = {
     Untested.NOT_KNOWN: "not known from these visits",
 }
 _VISIT = Schema("session=name date trials=#moved.trials")
-VISIT_ATTENTION = Schema("level text trial about")
 
 
 def visits_document(found: VisitComparison) -> Row:
@@ -61,7 +62,7 @@ def visits_document(found: VisitComparison) -> Row:
         "false_discovery_rate": 0.05,
         "quantities": QUANTITY_ROW.rows(found.quantities),
         "notes": list(found.notes),
-        "attention": [row for one in found.visits for row in VISIT_ATTENTION.rows(one.attention, session=one.name)],
+        "attention": [row for one in found.visits for row in ATTENTION_ROW.rows(one.attention, session=one.name)],
         "created_utc": made,
     }
 
@@ -164,17 +165,6 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
 
 
-def _figures(found: VisitComparison) -> list[tuple[str, str, str]]:
-    """Return title, angles and loads of every kind of cycle and side that is known in two visits."""
-    drawn = []
-    for kind, said in CYCLE_KINDS.items():
-        for side in ("right", "left", "middle"):
-            angles, loads = (visits_figure(found, kind, side, some) for some in (ANGLE_PANELS, LOAD_PANELS))
-            if angles or loads:
-                drawn.append((f"{said}, {'trunk and pelvis' if side == 'middle' else side}", angles, loads))
-    return drawn
-
-
 def placement_words() -> str:
     """Return what placing the markers anew is taken to add, in words, from the table of sizes."""
     size = placement_sizes()
@@ -194,7 +184,12 @@ def visits_page(found: VisitComparison, document: Row) -> str:
     """Return the page as HTML text."""
     from markupsafe import Markup
 
-    names = [one.name for one in found.visits]
+    names, figures = [one.name for one in found.visits], []
+    for kind, side in product(CYCLE_KINDS, ("right", "left", "middle")):
+        angles, loads = (Markup(visits_figure(found, kind, side, some)) for some in (ANGLE_PANELS, LOAD_PANELS))
+        if angles or loads:
+            about = f"{CYCLE_KINDS[kind]}, {'trunk and pelvis' if side == 'middle' else side}"
+            figures.append((about, angles, loads))
     rows, title = shown_quantities(found), f"Visits {' and '.join((names[0], names[-1]))}"
     sheet = print_sheet(title, {}, f"biodance {__version__}, {moment(document['created_utc'])}")
     return render(
@@ -207,7 +202,7 @@ def visits_page(found: VisitComparison, document: Row) -> str:
         placed=placement_words(),
         told=[row for row in rows if row["changed"]],
         others=[row for row in rows if not row["changed"]],
-        figures=[(said, Markup(angles), Markup(loads)) for said, angles, loads in _figures(found)],
+        figures=figures,
         attention=[(visit_place(one), one["text"]) for one in document["attention"]],
     )
 

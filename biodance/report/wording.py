@@ -76,14 +76,13 @@ def share_of(part: float) -> str:
 
 def parted_gain(gain: dict[str, dict[str, Any]]) -> str:
     """Return what the table gets wrong in a trial (``gain`` of a validation), mass and distribution apart."""
-    mass, spread = (_removed(gain[name]) for name in ("mass", "distribution"))
+    # each with its 95 % interval: 3.6 % (1.2 to 5.9)
+    mass, spread = (
+        f"{format_number(100 * share['value'])} %"
+        + (f" ({' to '.join(format_number(100 * x) for x in share['ci95'])})" if share["ci95"] else "")
+        for share in (gain["mass"], gain["distribution"])
+    )
     return f"of the table's difference {mass} is the wrong mass, and of the rest {spread} how it is distributed"
-
-
-def _removed(share: dict[str, Any]) -> str:
-    """Return a share with its 95 % interval: ``3.6 % (1.2 to 5.9)``."""
-    low_high = f" ({' to '.join(format_number(100 * x) for x in share['ci95'])})" if share["ci95"] else ""
-    return f"{format_number(100 * share['value'])} %{low_high}"
 
 
 def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:

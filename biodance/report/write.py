@@ -26,7 +26,6 @@ from biodance.records.attention import Attention
 from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
-from biodance.report.pages.language import ENGLISH
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
@@ -65,7 +64,7 @@ def write_session(
     tell("writing the page" if drawn else "writing")
     write_session_tables(tables, result, diagnosis, movement=moved)
     if for_subject:
-        write_subject_page(result, folder, diagnosis=found, movement=moved, language=for_subject)
+        write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, found, moved), for_subject)})
     return result, write_report(result, folder, diagnosis=found, movement=moved, drawn=drawn)
 
 
@@ -105,21 +104,6 @@ def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
         return {}
     keep_motions(result, folder)
     return {BODY_FILE if fit is not None else SCALED: body_text(*body_of_result(result))}
-
-
-def write_subject_page(
-    result: SessionResult,
-    folder: Path,
-    *,
-    diagnosis: SessionDiagnosis | None = None,
-    movement: SessionMovement | None = None,
-    language: str | Path = ENGLISH,
-) -> Path:
-    """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path; in a
-    ``language`` of `read_language`.
-    """
-    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis, movement), language)})
-    return folder / SUBJECT_PAGE
 
 
 def write_identification(
@@ -192,7 +176,8 @@ def _accepted(
     write. Only what is proven to gain on data that were not used is taken off or believed.
     """
     name, undone = f"session {result.session.folder.name}", found.mended.checks if found.mended else ()
-    findings, proven = _not_put_right(found, undone), _is_proven(found)
+    findings = _not_put_right(found, undone)
+    proven = _is_proven(found)
     copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
     files = _accepted_body(found, findings, name) | _lab_file(earlier, made)

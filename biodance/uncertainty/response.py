@@ -121,13 +121,6 @@ class Response:
         """(F, n) rad, of the joints."""
         return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
-    @property
-    def turned(self) -> Array:
-        """(F, n) rad, of the joints, since the posture in which the markers were placed: what a soft tissue did there
-        is in their places.
-        """
-        return self.angles - self.body.marked_posture[self.body.nq - len(self.body.joints) :]
-
     def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
         """Return the functionals (F, 9, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
         return np.asarray(self.answer[:, :, rows] @ moved)

@@ -65,7 +65,7 @@ class Slide(_WithAngles):
 
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the patterns, times the angles."""
-        left = [mean_local(trial, part, trial.turned[:, near]) for part, near in self._left(trial)]
+        left = [mean_local(trial, part, self._angles(trial)[:, near]) for part, near in self._left(trial)]
         return np.concatenate(left, axis=2)
 
     def squares(self, trial: Response) -> Array:
@@ -73,7 +73,9 @@ class Slide(_WithAngles):
         count = len(self.body.markers.names) * len(trial.place)
         parts = ((np.einsum("frp,frp->fp", left, left), near) for left, near in self._left(trial))
         # |left|² of a pattern times angle² summed over frames, over M F: mean squared distance.
-        return np.concatenate([(square.T @ trial.turned[:, near] ** 2 / count).ravel() for square, near in parts])
+        return np.concatenate(
+            [(square.T @ self._angles(trial)[:, near] ** 2 / count).ravel() for square, near in parts]
+        )
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
@@ -86,7 +88,8 @@ class Slide(_WithAngles):
                 yield trial.of_markers(self._moved(trial, s, on), rows), near
 
     def _angles(self, trial: Response) -> Array:
-        return trial.turned
+        placed = self.body.marked_posture  # what skin did there is in the places of the markers
+        return trial.angles - placed[self.body.nq - len(self.body.joints) :]
 
     @cached_property
     def _alone(self) -> tuple[bool, ...]:

@@ -139,20 +139,6 @@ LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
 """s."""
 
 
-def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng: np.random.Generator) -> Array:
-    """Return the true markers (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what skin adds; true vertical."""
-    from scipy.interpolate import make_interp_spline
-
-    person = performance.person
-    motion = performance.motion(time)
-    pose = poses(person.body, motion.q)
-    markers = person.body.markers
-    bone = pose.points(markers.segment, np.array(markers.position))
-    # Quintic: its second derivative is smooth, too.
-    acceleration = make_interp_spline(time, bone, k=5).derivative(2)(time)
-    return bone + skin_displacement(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)
-
-
 def film(
     performance: Performance,
     tissue: SoftTissue,
@@ -166,7 +152,14 @@ def film(
 
     Gaps come in every trial except the static one, which every laboratory repeats until it is complete.
     """
-    xyz = true_markers(performance, tissue, time, rng) @ tilt.T
+    from scipy.interpolate import make_interp_spline
+
+    # the true markers, true vertical: fixed to the bone, plus what skin adds
+    motion, person = performance.motion(time), performance.person
+    pose, markers = poses(person.body, motion.q), person.body.markers
+    bone = pose.points(markers.segment, np.array(markers.position))
+    acceleration = make_interp_spline(time, bone, k=5).derivative(2)(time)
+    xyz = (bone + skin_displacement(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)) @ tilt.T
     wander = skeleton.smooth_noise(rng, time, columns=3 * xyz.shape[1], cutoff=0.6).reshape(xyz.shape)
     xyz = xyz + tolerances.camera_wander * wander + tolerances.camera_noise * rng.normal(size=xyz.shape)
     if performance.plan.role != "static":
@@ -175,7 +168,7 @@ def film(
         for _ in range(rng.poisson(tolerances.gaps_per_minute * (time[-1] - time[0]) / 60.0)):
             first, marker = int(rng.integers(0, time.size)), int(rng.integers(0, xyz.shape[1]))
             xyz[first : first + int(rng.uniform(SHORTEST_GAP, LONGEST_GAP) / step), marker] = np.nan
-    return Markers(performance.person.body.markers.names, time, xyz)
+    return Markers(markers.names, time, xyz)
 
 
 HALF_SIZE = np.array([0.2, 0.3])

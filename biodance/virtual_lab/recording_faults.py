@@ -191,20 +191,14 @@ _SLACK = (10.0, 20.0, 40.0)  # N, half widths of the plays in the plate's joints
 @on_channel
 def plate_hysteresis(channel: Channel, width: float) -> Array:
     """Follow the load in a loop of half ``width`` (N or N·m): part of it passes through joints with play."""
-    load, slacks = channel.load, np.array(_SLACK) * (1.0 if channel.force else 0.33)
-    # What is missing behind joints with play, as a share of the play; the mean of several makes a rounded loop.
-    return load + width * np.mean([(_play(load, slack) - load) / slack for slack in slacks], axis=0)
-
-
-def _play(load: Array, slack: float) -> Array:
-    """Return what comes through a joint with play: it moves only when pushed by ``slack``."""
-    out = np.empty_like(load)
-    place = load[0]
-    for k, value in enumerate(load):
-        # Within the play nothing moves.
-        place = min(max(place, value - slack), value + slack)
-        out[k] = place
-    return out
+    load, loops = channel.load, []
+    for slack in np.array(_SLACK) * (1.0 if channel.force else 0.33):
+        # a joint with play moves only when pushed by its slack
+        through, place = np.empty_like(load), load[0]
+        for k, value in enumerate(load):
+            through[k] = place = min(max(place, value - slack), value + slack)
+        loops.append((through - load) / slack)
+    return load + width * np.mean(loops, axis=0)
 
 
 @on_channel

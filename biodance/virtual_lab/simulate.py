@@ -18,7 +18,7 @@ from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Subject
 from biodance.threads import one_thread
 from biodance.virtual_lab.causes import wobbling_mass
-from biodance.virtual_lab.movement.performance import AppliedForce, Performance
+from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
@@ -27,7 +27,6 @@ from biodance.virtual_lab.visit import (
     FIRST_VISIT,
     SWINGING,
     Instruments,
-    Laboratory,
     LabVisit,
     perform_in,
     record,
@@ -102,7 +101,11 @@ def write_visit(
         population=visit.laboratory.population,
     )
     person = replace(with_prostheses(person, visit.lighter_limbs), bent=bent)
-    instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
+    # what the flesh that swings by itself adds, in a laboratory of more than 16 segments
+    swinging = {part: CARRIERS.get(part, part) for part in soft_parts(visit.laboratory)}
+    masses = {part: SWINGING * person.body.sip.mass[TRUE_SEGMENTS.index(on)] for part, on in swinging.items()}
+    flesh = (wobbling_mass(person, part, mass) for part, mass in masses.items())
+    instruments = set_up(person, replace(visit, forces=(*visit.forces, *flesh)))
     with whole_folder(out) as part:
         _write(plan, person, instruments, visit, performed, part)
     return out
@@ -131,13 +134,6 @@ def _write(
     (out / TRUTH).mkdir()
     document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
-
-
-def _swinging_flesh(person: Person, laboratory: Laboratory) -> tuple[AppliedForce, ...]:
-    """Return what the flesh that swings by itself adds to the forces, in a laboratory of more than 16 segments."""
-    parts = ((name, CARRIERS.get(name, name)) for name in soft_parts(laboratory))
-    mass = person.body.sip.mass
-    return tuple(wobbling_mass(person, name, SWINGING * mass[TRUE_SEGMENTS.index(on)]) for name, on in parts)
 
 
 def check_simulated(subject: Subject) -> None:

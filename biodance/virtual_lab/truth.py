@@ -111,23 +111,10 @@ def _segments(sip: Sip) -> list[dict[str, Any]]:
     ]
 
 
-def _joint_centres(body: Body) -> dict[str, dict[str, Any]]:
-    """Return where each anatomical joint sits in the frame of the true segment next to it on the side of the pelvis."""
-    centres = {}
-    carried = {index: segment for segment, index in zip(TRUE_SEGMENTS, body.segment_joint, strict=True)}
-    for joint in body.joints:
-        if joint.parent in carried:
-            centres[joint.name.rsplit("_", 1)[0]] = {
-                "segment": carried[joint.parent],
-                "place_m": joint.translation.tolist(),
-            }
-    return centres
-
-
 def truth(person: Person, protocol: str, instruments: Instruments, performances: list[Performance]) -> dict[str, Any]:
     """Return the whole truth of a session, ready for JSON (SI units in the key names)."""
     bare, loaded = person.body, person.loaded_body
-    markers = bare.markers
+    markers, carried = bare.markers, dict(zip(bare.segment_joint, TRUE_SEGMENTS, strict=True))
     return {
         "version": __version__,
         "protocol": protocol,
@@ -141,7 +128,12 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         "segments_12_with_loads": _segments(merged_sip(person, loaded)),
         "segments_16": _segments(bare.sip),
         "segments_16_with_loads": _segments(loaded.sip),
-        "joint_centres": _joint_centres(bare),
+        # each anatomical joint in the frame of the true segment next to it on the side of the pelvis
+        "joint_centres": {
+            joint.name.rsplit("_", 1)[0]: {"segment": carried[joint.parent], "place_m": joint.translation.tolist()}
+            for joint in bare.joints
+            if joint.parent in carried
+        },
         "size_m": dict(person.size.size),
         "markers": {
             name: {"segment": TRUE_SEGMENTS[s], "place_m": place.tolist()}
@@ -152,7 +144,17 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         "laboratory": {k: v for k, v in asdict(instruments.visit.laboratory).items() if k != "tolerances"},
         "instruments": {
             "tilt": instruments.tilt.tolist(),
-            "plates": [_plate(p.corners, p) for p in instruments.plates],
+            "plates": [
+                {
+                    "side": plate.side,
+                    "corners_surveyed_m": plate.corners.tolist(),
+                    "true_rotation": plate.turn.tolist(),
+                    "true_centre_m": plate.centre.tolist(),
+                    "mixing": plate.mixing.tolist(),
+                    "offset": plate.offset.tolist(),
+                }
+                for plate in instruments.plates
+            ],
         },
         "trials": [
             {
@@ -163,18 +165,6 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
             }
             for p in performances
         ],
-    }
-
-
-def _plate(corners: Array, plate: Any) -> dict[str, Any]:
-    """Return how a plate truly is, against how it was surveyed."""
-    return {
-        "side": plate.side,
-        "corners_surveyed_m": corners.tolist(),
-        "true_rotation": plate.turn.tolist(),
-        "true_centre_m": plate.centre.tolist(),
-        "mixing": plate.mixing.tolist(),
-        "offset": plate.offset.tolist(),
     }
 
 

@@ -70,6 +70,8 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
 
     High-passed, rectified, low-passed, each a second-order Butterworth run forth and back.
     """
+    from scipy.signal import butter, sosfiltfilt
+
     found: dict[tuple[str, str], EmgEnvelope] = {}
     if not rate >= _SLOWEST or len(analog) < rate / 2:
         return ()
@@ -84,7 +86,10 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
         unit = units[column].strip() if column < len(units) else ""
         factor = _MILLIVOLTS.get(unit.lower(), 1.0)
         told = "mV" if unit.lower() in _MILLIVOLTS else unit
-        found[named] = EmgEnvelope(*named, told, time, factor * _envelope(value, rate))
+        if abs(value.min()) > _RECTIFIED * np.abs(value).max():
+            value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
+        envelope = np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))
+        found[named] = EmgEnvelope(*named, told, time, factor * envelope)
     strongest = max((one.value.max() for one in found.values()), default=0.0)
     return tuple(one for one in found.values() if one.value.max() > _SILENT * strongest)
 
@@ -100,12 +105,3 @@ def muscle_of(label: str) -> tuple[str, str] | None:
         if match and muscle:
             return muscle, "left" if match["side"].lower().startswith("l") else "right"
     return None
-
-
-def _envelope(value: Array, rate: float) -> Array:
-    from scipy.signal import butter, sosfiltfilt
-
-    # Lowest value near zero: rectified already, only to be smoothed.
-    if abs(value.min()) > _RECTIFIED * np.abs(value).max():
-        value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
-    return np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))

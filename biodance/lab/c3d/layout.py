@@ -144,32 +144,26 @@ def read_layout(content: bytes, header: Header, parameters: Parameters, where: s
         The file is cut off, holds no data, or its header, parameters and length contradict each other without a
         decision.
     """
-    notes: list[str] = []
-    scale = _agreed_scale(header, parameters, where)
-    floating = scale < 0
-    remarks: list[str] = []
+    notes, remarks = list[str](), list[str]()
+    written = parameter_numbers(parameters, "POINT", "SCALE")
+    scale = float(written[0]) if written.size else header.scale
+    # the sign tells floats (< 0) from integers, where the size counts too
+    if not (math.isclose(scale, header.scale, rel_tol=1e-6) or (scale < 0 and header.scale < 0)):
+        raise FileRefused(
+            f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not "
+            f"known. {RESAVE}"
+        )
+    floating = header.scale < 0
     word = 4 if floating else 2
     start, points, channels, samples, frames = _counts(content, header, parameters, word, where, notes, remarks)
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
     gain, offset = _analog_transform(parameters, channels, unsigned, where, remarks)
     first = _first_frame_number(header, parameters, frames, notes)
-    kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
+    kind = (floating, unsigned, abs(header.scale), rate, analog_rate, gain, offset)
     return Layout(
         header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes), tuple(remarks)
     )
-
-
-def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
-    """Return the header's scale; its sign tells floats (< 0) from integers, where its size counts too."""
-    written = parameter_numbers(parameters, "POINT", "SCALE")
-    scale = float(written[0]) if written.size else header.scale
-    if not (math.isclose(scale, header.scale, rel_tol=1e-6) or (scale < 0 and header.scale < 0)):
-        raise FileRefused(
-            f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not "
-            f"known. {RESAVE}"
-        )
-    return header.scale
 
 
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:

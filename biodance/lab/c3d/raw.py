@@ -7,6 +7,7 @@ import re
 import subprocess
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -365,7 +366,12 @@ def _smells(
     """Have suspicious numbers judged by a second reader; return its judgement and who agrees, or refuse."""
     no_markers = {*model_outputs(labels, parameters), *_unlabelled(labels)}
     markers = [column for column in range(layout.points) if column not in no_markers]
-    leaps = _leaps(numbers[0], markers, parameters)
+    points, leaps = numbers[0], 0
+    with suppress(FileRefused):  # where the unit is not known, no distance is
+        metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
+        for start in range(0, len(points), _FRAMES):
+            step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
+            leaps += int(np.count_nonzero(any_coordinate(step > _LEAP * metre)))
     if not leaps and not layout.notes:
         return (), "biodance"
     opinion = second_opinion(path, numbers, layout)
@@ -378,19 +384,6 @@ def _smells(
     if opinion == "confirmed":
         return (f"{smell}; ezc3d finds the same numbers.",), "biodance, ezc3d"
     return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
-
-
-def _leaps(points: Array, markers: list[int], parameters: Parameters) -> int:
-    """Return how often a marker moves by more than a metre between two frames; 0 if the unit is not known."""
-    try:
-        metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
-    except FileRefused:
-        return 0
-    found = 0
-    for start in range(0, len(points), _FRAMES):
-        step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
-        found += int(np.count_nonzero(any_coordinate(step > _LEAP * metre)))
-    return found
 
 
 def _fit(names: list[str], count: int) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.c3d.layout import Layout, texts
+from biodance.lab.c3d.layout import texts
 from biodance.lab.c3d.parameters import label_rows, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_raw, split_label
 from biodance.lab.c3d.write import FileValue
@@ -179,7 +179,7 @@ def _refuse_changed(raw: RawC3d, made: Path) -> None:
 
 
 def _copy(original: str, made: str, question: dict[str, Any]) -> None:
-    """Write the copy: the child's part."""
+    """Write the copy: the child's part. Results become points; where there is none the residual is -1."""
     import ezc3d
 
     file = ezc3d.c3d(original)
@@ -188,7 +188,14 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
     taken = {key: point.pop(key, {"value": []})["value"] for key in continued}  # ezc3d writes continuations anew
     labels = [*point["LABELS"]["value"], *(text for key in taken if continued[key] == "LABELS" for text in taken[key])]
     point["LABELS"]["value"] = [*labels, *question["labels"]]
-    _add_points(file, np.load(Path(made).with_name("values.npy")))
+    values = np.load(Path(made).with_name("values.npy"))
+    data, seen = file["data"], np.isfinite(values).all(axis=2).T
+    added = np.ones((4, *seen.shape))
+    added[:3] = np.where(seen, np.moveaxis(values, (2, 1, 0), (0, 1, 2)), 0.0)
+    meta = data["meta_points"]
+    data["points"] = np.concatenate([data["points"], added], axis=1)
+    meta["residuals"] = np.concatenate([meta["residuals"], np.where(seen, 0.0, -1.0)[None]], axis=1)
+    meta["camera_masks"] = np.concatenate([meta["camera_masks"], np.zeros((7, *seen.shape), dtype=bool)], axis=1)
     for kind in dict.fromkeys(question["kinds"]):
         new = [label for label, own in zip(question["labels"], question["kinds"], strict=True) if own == kind]
         file.add_parameter("POINT", kind, [*(point[kind]["value"] if kind in point else []), *new])
@@ -198,17 +205,6 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
         file.add_parameter("BIODANCE", name, value)
     _add_events(file, question["events"])
     file.write(made)
-
-
-def _add_points(file: Any, values: Array) -> None:
-    """Append results (T, K, 3) as points; where there is none the residual is -1."""
-    data, seen = file["data"], np.isfinite(values).all(axis=2).T
-    added = np.ones((4, *seen.shape))
-    added[:3] = np.where(seen, np.moveaxis(values, (2, 1, 0), (0, 1, 2)), 0.0)
-    meta = data["meta_points"]
-    data["points"] = np.concatenate([data["points"], added], axis=1)
-    meta["residuals"] = np.concatenate([meta["residuals"], np.where(seen, 0.0, -1.0)[None]], axis=1)
-    meta["camera_masks"] = np.concatenate([meta["camera_masks"], np.zeros((7, *seen.shape), dtype=bool)], axis=1)
 
 
 def _add_events(file: Any, events: list[Any]) -> None:
@@ -239,6 +235,11 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
     content, parameters, layout, _ = open_c3d(source)
     columns = {split_label(label)[1]: column for column, label in enumerate(point_labels(parameters, layout))}
     changed, names = bytearray(content), dict[str, str]()
+    word = 4 if layout.floating else 2
+    row = word * (4 * layout.points + layout.channels * layout.samples)
+    # every frame as bytes, in the place where it lies
+    frames = np.frombuffer(changed, dtype=np.uint8, count=layout.frames * row, offset=layout.start)
+    frames = frames.reshape(layout.frames, row)
     for pair, spans in exchanged.items():
         if absent := [label for label in pair if label not in columns]:
             raise FileRefused(
@@ -247,32 +248,17 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
         if tuple(spans) == ((0, layout.frames),):
             names |= {pair[0]: pair[1], pair[1]: pair[0]}
         else:
-            _exchange_points(changed, layout, [columns[label] for label in pair], spans)
-    _rename(changed, source, names)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    return write_whole(target, bytes(changed))
-
-
-def _exchange_points(
-    content: bytearray, layout: Layout, columns: Sequence[int], spans: Sequence[tuple[int, int]]
-) -> None:
-    """Exchange two points, coordinates and residual, in the frames of the data section."""
-    word = 4 if layout.floating else 2
-    row = word * (4 * layout.points + layout.channels * layout.samples)
-    data = np.frombuffer(content, dtype=np.uint8, count=layout.frames * row, offset=layout.start)
-    one, other = (data.reshape(layout.frames, row)[:, 4 * word * k : 4 * word * (k + 1)] for k in columns)
-    for start, stop in spans:
-        one[start:stop], other[start:stop] = other[start:stop].copy(), one[start:stop].copy()
-
-
-def _rename(content: bytearray, source: Path, names: Mapping[str, str]) -> None:
-    """Write other ``names`` over the labels of points."""
-    header = read_header(bytes(content), str(source))
-    for start, width in label_rows(bytes(content), header, str(source)):
+            # coordinates and residual of both
+            one, other = (frames[:, 4 * word * columns[label] : 4 * word * (columns[label] + 1)] for label in pair)
+            for start, stop in spans:
+                one[start:stop], other[start:stop] = other[start:stop].copy(), one[start:stop].copy()
+    for start, width in label_rows(content, read_header(content, str(source)), str(source)):
         prefix, name = split_label(content[start : start + width].decode("latin-1").split("\0")[0])
         if name in names:
             label = f"{prefix}:{names[name]}" if prefix else names[name]
-            content[start : start + width] = label.encode("latin-1").ljust(width)[:width]
+            changed[start : start + width] = label.encode("latin-1").ljust(width)[:width]
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return write_whole(target, bytes(changed))
 
 
 if __name__ == "__main__":

@@ -141,7 +141,14 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
 def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
     """Return the columns whose label belongs to the chosen subject."""
     prefixes = _people_of(raw.split_labels[i][0] for i in columns)
-    columns = _without_things(raw, columns, prefixes, history)
+    things = dict.fromkeys(prefix for i in columns if (prefix := raw.split_labels[i][0]) not in ("", *prefixes))
+    of_people = [i for i in columns if raw.split_labels[i][0] not in things]
+    if things:
+        history.append(
+            f"{len(columns) - len(of_people)} points of {', '.join(things)} left out: so few markers are those of a "
+            f"thing."
+        )
+    columns = of_people
     if subject is None and len(prefixes) > 1:
         raise FileRefused(
             f"{raw.path}: holds markers of {len(prefixes)} subjects ({', '.join(prefixes)}) and none was chosen. "
@@ -162,17 +169,6 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
     history.append(
         f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out."
     )
-    return own
-
-
-def _without_things(raw: RawC3d, columns: list[int], people: tuple[str, ...], history: list[str]) -> list[int]:
-    """Return the columns of labels without prefix or of people; what else there is is said."""
-    own = [i for i in columns if raw.split_labels[i][0] in ("", *people)]
-    things = dict.fromkeys(raw.split_labels[i][0] for i in columns if i not in set(own))
-    if things:
-        history.append(
-            f"{len(columns) - len(own)} points of {', '.join(things)} left out: so few markers are those of a thing."
-        )
     return own
 
 
@@ -230,7 +226,10 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     """
     known = {_NAMES[name]: value for name, value in _written(raw).items() if name in _NAMES}
     written = {name: value for name, value in known.items() if value != 0 and not math.isnan(value)}
-    scale = _scale(written)
+    # metres per unit by which stature, else a leg, is a person's; mm if neither is there
+    lengths = (("Height", _STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG))
+    ranges = [(written[name], *legal) for name, legal in lengths if name in written]
+    scale = next((s for value, low, high in ranges for s in _SCALES if low <= value * s <= high), _SCALES[0])
     warnings: list[str] = []
     measures: dict[str, float] = {}
     for name, value in written.items():
@@ -242,9 +241,9 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
             measures[name] = value
         else:
             warnings.append(f"The file says {name} = {written[name]:g}, which a person cannot have; it was left out.")
-    lengths = [name for name in measures if name not in _PLAIN]
     unit = {1e-3: "mm", 1e-2: "cm", 1.0: "m"}[scale]
-    said = f"{len(measures)} measures of the subject read from the file{f', lengths in {unit}' if lengths else ''}."
+    sized = f", lengths in {unit}" if measures.keys() - {*_PLAIN} else ""
+    said = f"{len(measures)} measures of the subject read from the file{sized}."
     return measures, (said,) if measures else (), tuple(warnings)
 
 
@@ -266,13 +265,3 @@ def _written(raw: RawC3d) -> dict[str, float]:
             key = name.upper().replace("_", "").replace(" ", "").lstrip("$")
             found.setdefault(_OTHER_NAMES.get(key, key), float(value))
     return found
-
-
-def _scale(written: dict[str, float]) -> float:
-    """Return metres per unit by which stature, else a leg, is a person's; mm if neither is there."""
-    for name, (low, high) in (("Height", _STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG)):
-        if name in written:
-            fitting = [scale for scale in _SCALES if low <= written[name] * scale <= high]
-            if fitting:
-                return fitting[0]
-    return _SCALES[0]

@@ -224,7 +224,11 @@ class _PersonLabels:
             pairs, least = _cheapest(cost)
             new = dict(fixed)
             for i, j in pairs:
-                if not free[i, j] or self._next_best(i, j, cost, rivals) - least >= _nats("margin"):
+                # the next best assignment, in which no marker at this place is the landmark
+                beside, other = np.linalg.norm(self._shares - self._shares[i], axis=1), cost.copy()
+                column = np.minimum(cost[:, j], rivals[:, j])
+                other[:, j] = np.where(beside <= upright.bound("same"), np.inf, column)
+                if not free[i, j] or _cheapest(other)[1] - least >= _nats("margin"):
                     new[LANDMARKS[j]] = labels[i]
             away = self._distances(new)
             for place, label in tuple(new.items()):
@@ -261,13 +265,6 @@ class _PersonLabels:
     def is_named(self, place: str, label: str) -> bool:
         """Return whether the words of a label name a landmark, or name it by mistake."""
         return bool(np.isfinite(self.words[self.rows[label], _AT[place]]))
-
-    def _next_best(self, row: int, column: int, cost: Array, rivals: Array) -> float:
-        """Return the sum of the next best assignment, in which no marker at this place is the landmark."""
-        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= upright.bound("same")
-        other = cost.copy()
-        other[:, column] = np.where(beside, np.inf, np.minimum(cost[:, column], rivals[:, column]))
-        return _cheapest(other)[1]
 
     def _distances(self, known: Mapping[str, str]) -> Array:
         """Return (N, P) half the squared distances given ``known`` landmarks; inf for those without usual place."""

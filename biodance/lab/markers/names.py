@@ -55,7 +55,9 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
     given = {label: name.removeprefix(shared) or name for label, name in given.items()}
-    ending = _ending(list(given.values()))
+    # the last word after a separator (_study, _pt) that nearly all names end with
+    ends = Counter(found[0] for name in given.values() if (found := re.search(r"(?<=.)[\W_][^\W\d_]+$", name)))
+    ending = next((end for end, times in ends.items() if times >= max(_SHARED * len(given), 4)), "")
     return {label: name.removesuffix(ending) or name for label, name in given.items()}
 
 
@@ -71,13 +73,6 @@ def _beginning(names: Sequence[str]) -> str:
     capital = sum(name[1:2].isupper() for name in names) >= _SHARED * len(names)
     end = re.compile(r".*(.[\W_]|\d\d)|\D{3,}" + ("|[a-z]" if capital else ""), re.DOTALL)
     return max((start for start in often if end.fullmatch(start)), key=len, default="")
-
-
-def _ending(names: Sequence[str]) -> str:
-    """Return the last word after a separator (_study, _pt) that nearly all names end with."""
-    ends = Counter(found[0] for name in names if (found := re.search(r"(?<=.)[\W_][^\W\d_]+$", name)))
-    often = [end for end, times in ends.items() if times >= max(_SHARED * len(names), 4)]
-    return often[0] if often else ""
 
 
 def _tokens_of(label: str) -> tuple[str, ...]:
@@ -307,7 +302,12 @@ def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     words = _vocabulary()
     joined = ["".join(order) for order in permutations(rest)] if len(rest) <= 3 else ["".join(rest)]
     spelled = [one for spelling in joined for one in words.landmarks.get(spelling, ())]
-    landmarks = [(place, rank) for landmark, rank in spelled if (place := _landmark_on(side, landmark))]
+    # a landmark on the midline has no side, unless it is the mean of both; every other one has one
+    landmarks = [
+        (landmark if landmark in _MIDLINE else f"{side}_{landmark}", rank)
+        for landmark, rank in spelled
+        if landmark in _WHOLE or bool(side) != (landmark in _MIDLINE)
+    ]
     found = landmarks + [(place, 500) for spelling in joined if (place := _segment_spelled(spelling, side))]
     if side and not found:
         parts = (words.segments[token] for token in rest if len(token) > 2 and token in words.segments)
@@ -315,15 +315,6 @@ def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     if side and not landmarks:
         found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(rest)]
     return found
-
-
-def _landmark_on(side: str, landmark: str) -> str:
-    """Return a landmark with its ``side``; "" where it lies on the midline but has one, or lacks the one it needs."""
-    if landmark in _WHOLE:
-        return landmark
-    if landmark in _MIDLINE:
-        return "" if side else landmark
-    return f"{side}_{landmark}" if side else ""
 
 
 def _segment_on(side: str, segment: str) -> str:

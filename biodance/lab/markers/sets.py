@@ -167,17 +167,6 @@ def _parse_marker_set(path: Path) -> MarkerSet:
     return MarkerSet("", description, source, tuple(markers.values()), dict(aliases), chosen, required)
 
 
-def _read_map(path: Path) -> MarkerSet:
-    """Read ``[markers] map`` of a session.toml; see `parse_map`."""
-    table = read_toml(path).get("markers")
-    given = table.get("map") if isinstance(table, dict) else None
-    if not isinstance(given, dict) or not given:
-        raise BiodanceError(
-            f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
-        )
-    return parse_map(given, str(path))
-
-
 def parse_map(given: Mapping[str, Any], path: str) -> MarkerSet:
     """Return the marker set, without a name, of a map of labels to places; ``path`` names where it stands.
 
@@ -340,10 +329,16 @@ _PLACED = ("plug_in_gait", "isb_landmarks")
 
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
-    """Return the marker set in a file; read anew when the file has changed."""
-    if path.name in _MAPS:
-        return _made(name, _read_map(path), usual=True)
-    return _made(name, _parse_marker_set(path), usual=path.stem not in _PLACED)
+    """Return the marker set in a file, or of the map in a session.toml; read anew when the file has changed."""
+    if path.name not in _MAPS:
+        return _made(name, _parse_marker_set(path), usual=path.stem not in _PLACED)
+    table = read_toml(path).get("markers")
+    given = table.get("map") if isinstance(table, dict) else None
+    if not isinstance(given, dict) or not given:
+        raise BiodanceError(
+            f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
+        )
+    return _made(name, parse_map(given, str(path)), usual=True)
 
 
 @cache

@@ -79,12 +79,15 @@ def faulty_markers(markers: Markers) -> tuple[FaultyMarker, ...]:
     """Return the markers that stand still to the last bit while the others move, and those that jump."""
     frozen = _frozen(markers.xyz)
     clean = np.where(frozen[:, :, None], np.nan, markers.xyz)
-    found = [_faulty(label, MarkerFault.FROZEN, frozen[:, k], float("nan")) for k, label in enumerate(markers.names)]
+    found = [
+        FaultyMarker(label, MarkerFault.FROZEN, tuple(runs(frozen[:, k])), float("nan"))
+        for k, label in enumerate(markers.names)
+    ]
     step = 1 / markers.rate if markers.time.size > 1 else np.nan
     off = [_off_its_way(clean, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
     for k in np.flatnonzero(np.max(off, axis=0) > _limit(step)):
         jumps, size = _spikes(clean[:, k], step)
-        found.append(_faulty(markers.names[k], MarkerFault.SPIKE, jumps, size))
+        found.append(FaultyMarker(markers.names[k], MarkerFault.SPIKE, tuple(runs(jumps)), size))
     return tuple(one for one in found if one.spans)
 
 
@@ -141,10 +144,6 @@ def without_frozen(trial: Trial) -> Trial:
     return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
 
 
-def _faulty(label: str, fault: MarkerFault, frames: Mask, size: float) -> FaultyMarker:
-    return FaultyMarker(label, fault, tuple(runs(frames)), size)
-
-
 def _frozen(xyz: Array) -> Mask:
     """Return (T, K) where markers ``xyz`` (T, K, 3) repeat the frame before while the others move."""
     frozen = np.zeros(xyz.shape[:2], dtype=bool)
@@ -155,8 +154,13 @@ def _frozen(xyz: Array) -> Mask:
     for k in np.flatnonzero(repeats.sum(axis=0) >= _REPEATS):
         steps = np.linalg.norm(np.diff(xyz[:, k], axis=0, prepend=np.nan), axis=1)
         for start, stop in runs(repeats[:, k]):
-            if stop - start >= _REPEATS and _breaks_off(steps, start, stop) and _travelled(xyz, repeats, start, stop):
-                frozen[start:stop, k] = True
+            if stop - start >= _REPEATS and _breaks_off(steps, start, stop):
+                # the markers that do not repeat themselves too must move meanwhile
+                others = repeats[start:stop].mean(axis=0) < 0.5
+                with np.errstate(invalid="ignore"):
+                    away = np.linalg.norm(xyz[start:stop, others] - xyz[start - 1, others], axis=2)
+                farthest = np.nan_to_num(away).max(axis=0, initial=0.0)
+                frozen[start:stop, k] = bool(farthest.size) and float(np.median(farthest)) > _TRAVELLED
     return frozen
 
 
@@ -169,16 +173,6 @@ def _breaks_off(steps: Array, start: int, stop: int) -> bool:
             if steps[near] > _FELT and not (steps[near] < _SLOWER * steps[far] and slower_yet):
                 return True
     return False
-
-
-def _travelled(xyz: Array, repeats: Mask, start: int, stop: int) -> bool:
-    """Return whether the markers that do not repeat themselves too move from frame ``start`` - 1 on."""
-    # Those of which at most half of the stretch repeats.
-    others = repeats[start:stop].mean(axis=0) < 0.5
-    with np.errstate(invalid="ignore"):
-        away = np.linalg.norm(xyz[start:stop, others] - xyz[start - 1, others], axis=2)
-    farthest = np.nan_to_num(away).max(axis=0, initial=0.0)
-    return bool(farthest.size) and float(np.median(farthest)) > _TRAVELLED
 
 
 def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
@@ -260,6 +254,10 @@ class MarkerGaps:
     longest: float
 
 
+BRIDGED = "bridged by a spline"
+"""How a short gap was dealt with."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """Frames ``start`` to ``stop`` (excluded) of a marker that were not seen; ``how`` it was dealt with."""
@@ -312,11 +310,9 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
                 later.append(Gap(label, start, stop))
             else:
                 xyz[start:stop, column] = bridge
-                gaps.append(Gap(label, start, stop, "bridged by a spline"))
+                gaps.append(Gap(label, start, stop, BRIDGED))
     xyz.setflags(write=False)  # the record keeps it without a copy
     bridged = Markers(markers.names, markers.time, xyz, _filled(markers, xyz))
-    if not later:
-        return bridged, tuple(gaps)
     xyz = xyz.copy()
     for gap in later:
         carried, how = _carry(bridged, gap, segments)

@@ -2,16 +2,16 @@
 own stamps, and what that costs is said. One place for tables, .trc and .mot; C3D holds a rate and no stamps.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.interpolate import make_smoothing_spline
+from scipy.interpolate import make_interp_spline, make_smoothing_spline
 
 from biodance.errors import FileRefused
 from biodance.lab.markers.signals import faulty_markers, without_faults
-from biodance.records import Array, Index, Markers, Mask, runs
+from biodance.records import Array, Markers, Mask, runs
 
 _ROUNDED = 0.2
 """Share of a step by which a stamp may lie off equal steps: writers round the time column."""
@@ -40,11 +40,6 @@ class TimeAxis:
     sampled: bool
     said: str = ""
 
-    def from_zero(self) -> "TimeAxis":
-        """Return the same axis with its first time at 0."""
-        first = self.time[0] if self.time.size else 0.0
-        return replace(self, stamps=self.stamps - first, time=self.time - first)
-
     def at(self, values: Array) -> Array:
         """Return ``values`` (S, ...) on ``time``, by cubic splines between samples that are known; NaN where one of the
         two neighbours is not, or where they lie more than 2.5 steps apart.
@@ -55,22 +50,15 @@ class TimeAxis:
         out = np.full((self.time.size, columns.shape[1]), np.nan)
         known = np.isfinite(columns)
         whole = known.all(axis=0)
-        groups = [np.flatnonzero(whole), *([k] for k in np.flatnonzero(~whole))]
-        for group in map(np.asarray, groups):
-            if group.size:
-                self._interpolate(columns, known[:, group[0]], group, out)
+        # columns that are known throughout go together
+        for group in [np.flatnonzero(whole)] * bool(whole.any()) + [np.array([k]) for k in np.flatnonzero(~whole)]:
+            for start, stop in _pieces(self.stamps, known[:, group[0]]):
+                stamps = self.stamps[start:stop]
+                inside = (self.time >= stamps[0]) & (self.time <= stamps[-1])
+                if stamps.size > 1 and inside.any():
+                    spline = make_interp_spline(stamps, columns[start:stop, group], k=min(3, stamps.size - 1))
+                    out[np.ix_(inside, group)] = spline(self.time[inside])
         return out.reshape(self.time.size, *values.shape[1:])
-
-    def _interpolate(self, columns: Array, known: Mask, group: Index, out: Array) -> None:
-        """Write the ``group`` of ``columns`` (S, C) that share what is ``known`` (S,) into ``out`` (T, C)."""
-        from scipy.interpolate import make_interp_spline
-
-        for start, stop in _pieces(self.stamps, known):
-            stamps = self.stamps[start:stop]
-            inside = (self.time >= stamps[0]) & (self.time <= stamps[-1])
-            if stamps.size > 1 and inside.any():
-                spline = make_interp_spline(stamps, columns[start:stop, group], k=min(3, stamps.size - 1))
-                out[np.ix_(inside, group)] = spline(self.time[inside])
 
     @property
     def noise(self) -> float:

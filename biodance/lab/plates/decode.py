@@ -7,7 +7,6 @@ types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -106,19 +105,6 @@ class PlateReading:
         return loaded_samples(self.sensor, self.rate)
 
 
-class _Geometry(NamedTuple):
-    """What of a plate no sample can change: (4, 3) m ``corners`` and lab_R_plate ``axes`` (3, 3) in the lab, ``half``
-    the sides (2,) m, ORIGIN (3,) m; what was decided.
-    """
-
-    corners: Array
-    axes: Array
-    half: Array
-    origin: Array
-    corners_said: tuple[str, ...]
-    origin_said: tuple[str, ...]
-
-
 def decode_plates(
     raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
 ) -> tuple[list[PlateReading], dict[int, str], tuple[str, ...]]:
@@ -174,14 +160,6 @@ def decode_plates(
     return plain, lost_plain, (said,)
 
 
-def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
-    """Return where a plate lies; TrialRefused where corners or ORIGIN make no sense."""
-    corners, said = corners_in_lab(plate.corners, metres=metres, turn=turn)
-    axes, half = plate_axes(corners), half_sides(corners)
-    origin, origin_said = _origin(plate, half, metres)
-    return _Geometry(corners, axes, half, origin, said, origin_said)
-
-
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
     """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
     four = plate.type in FOUR_SENSORS
@@ -212,14 +190,17 @@ def _decode_each(
     readings, lost = [], {}
     for plate in plates:
         try:
-            readings.append(_decode(raw, plate, _geometry(plate, metres, turn)))
+            readings.append(_decode(raw, plate, metres, turn))
         except TrialRefused as error:
             lost[plate.number] = str(error)
     return readings, lost
 
 
-def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReading:
-    """Return the reading of one plate; TrialRefused where no sample is known."""
+def _decode(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array) -> PlateReading:
+    """Return the reading of one plate; TrialRefused where corners or ORIGIN make no sense, or no sample is known."""
+    corners, corners_said = corners_in_lab(plate.corners, metres=metres, turn=turn)
+    half = half_sides(corners)
+    origin, origin_said = _origin(plate, half, metres)
 
     def in_si(samples: Array) -> Array:
         # Calibration @ channels, sample by sample as rows.
@@ -228,7 +209,7 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
 
     # TYPE 1 gives a point on the surface, four sensors lie around the axis: only x, y or only z leads to the centre
     used = [False, False, True] if plate.type in FOUR_SENSORS else [True, True, plate.type != 1]
-    vector = np.where(used, place.origin, 0.0)
+    vector = np.where(used, origin, 0.0)
     channels, known, gaps_said = _without_gaps(np.asarray(raw.analog[:, plate.channels], dtype=float), plate)
     vertical = in_si(channels)[:, _VERTICAL.get(plate.type, (2,))].sum(axis=1)
     zero = find_baseline(vertical, zero=plate.zero, rate=raw.analog_rate)
@@ -237,14 +218,13 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
         offsets = channels[zero.start : zero.stop].mean(axis=0)
         if plate.type == 1:  # where an empty plate is pressed has no zero
             offsets = np.where([kind == "L" for kind in CONTENT[1]], 0.0, offsets)
-    sensor = sensor_wrench(plate.type, in_si(channels - offsets), place.origin)
-    # What is taken off, as a wrench: the forces of the empty plate.
-    empty = sensor_wrench(plate.type, in_si(offsets[None]), place.origin)[0, :3]
+    sensor = sensor_wrench(plate.type, in_si(channels - offsets), origin)
+    empty = sensor_wrench(plate.type, in_si(offsets[None]), origin)[0, :3]
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
-    where = (place.corners_said, place.origin_said)
-    said = Decisions((first, *told), *where, plate.units_said, gaps_said, (), (zero.said,))
-    return PlateReading(plate, *place[:3], sensor, vector, raw.analog_rate, empty, known, said)
+    said = Decisions((first, *told), corners_said, origin_said, plate.units_said, gaps_said, (), (zero.said,))
+    axes = plate_axes(corners)
+    return PlateReading(plate, corners, axes, half, sensor, vector, raw.analog_rate, empty, known, said)
 
 
 def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask, tuple[str, ...]]:
@@ -360,10 +340,10 @@ def is_unloaded(level: float, vertical: Array) -> bool:
 
 
 def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
-    """Return the means of ``values`` (S,) over whole blocks of ``length`` s (one at least), and samples a block."""
-    size = min(max(1, round(length * rate)), values.size)
-    count = values.size // size
-    return values[: count * size].reshape(count, size).mean(axis=1), size
+    """Return the means of ``values`` (S, ...) over whole blocks of ``length`` s (one at least), and samples a block."""
+    size = min(max(1, round(length * rate)), len(values))
+    count = len(values) // size
+    return values[: count * size].reshape(count, size, *values.shape[1:]).mean(axis=1), size
 
 
 def _range(values: Array) -> tuple[float, float]:

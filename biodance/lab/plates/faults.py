@@ -18,7 +18,8 @@ _AXES = ("x", "y", "z")
 class PlateFault:
     """One fault of a plate: ``name`` of its effect, ``parameter`` and ``unit`` of its size, and whether it is
     ``lasting``: stays with a laboratory from one session to the next; ``legal`` sizes: beyond them the plate
-    reads another unit, or is another plate, which no correction mends.
+    reads another unit, or is another plate, which no correction mends; ``places`` where on a plate it can be;
+    ``of_plate`` whether a target must name its plate, too.
 
     With a fault of some size at a place (a channel ``Fz``, a pair ``Fz->My``, an axis ``x``) a plate reads ``mixing`` @
     wrench + size ``zero``, about its centre (N, N·m).
@@ -29,11 +30,8 @@ class PlateFault:
     unit: str
     legal: tuple[float, float]
     lasting: bool = True
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """Where on a plate it can be."""
-        return CHANNELS
+    places: tuple[str, ...] = CHANNELS
+    of_plate: bool = False
 
     def slope(self, place: str) -> Array:
         """Return (6, 6), the change of ``mixing`` per unit of a small size."""
@@ -74,19 +72,10 @@ class PlateFault:
 
     def is_target(self, target: str) -> bool:
         """Return whether ``target`` names a place of this fault, with or without its plate."""
-        return target.rpartition(":")[2] in self.places
+        return (":" in target or not self.of_plate) and target.rpartition(":")[2] in self.places
 
 
-class _AtAxis(PlateFault):
-    @property
-    def places(self) -> tuple[str, ...]:
-        return _AXES
-
-    def is_target(self, target: str) -> bool:
-        return ":" in target and super().is_target(target)
-
-
-class _Position(_AtAxis):
+class _Position(PlateFault):
     """The file puts the plate ``size`` m along an axis beside where it is: M = shift x F."""
 
     def slope(self, place: str) -> Array:
@@ -97,7 +86,7 @@ class _Position(_AtAxis):
         return plate.corners + size * _unit(place)
 
 
-class _Rotation(_AtAxis):
+class _Rotation(PlateFault):
     """What is recorded is turned by ``size`` rad about an axis through the plate's centre, as its corners are."""
 
     def slope(self, place: str) -> Array:
@@ -129,10 +118,6 @@ class _Gain(PlateFault):
 class _Crosstalk(PlateFault):
     """A channel reads ``size`` times another one in addition."""
 
-    @property
-    def places(self) -> tuple[str, ...]:
-        return tuple(f"{a}->{b}" for a in CHANNELS for b in CHANNELS if a != b)
-
     def slope(self, place: str) -> Array:
         first, _, second = place.partition("->")
         # Row of the second, column of the first channel; its square is zero, so -size undoes size exactly.
@@ -148,10 +133,6 @@ class _Offset(PlateFault):
 
 class _Delay(PlateFault):
     """All that the plate reads comes ``size`` s late."""
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        return ("",)
 
     def done(self, plate: Plate, place: str, size: float) -> Plate:
         return replace(plate, wrench=Wrench(plate.wrench.time + size, plate.wrench.value))
@@ -172,12 +153,13 @@ def _channel(place: str) -> Array:
     return np.eye(6)[CHANNELS.index(place)]
 
 
-POSITION = _Position("plate_position", "shift", "m", (-10.0, 10.0))
-ROTATION = _Rotation("plate_rotation", "angle", "rad", (-np.pi, np.pi))
+POSITION = _Position("plate_position", "shift", "m", (-10.0, 10.0), places=_AXES, of_plate=True)
+ROTATION = _Rotation("plate_rotation", "angle", "rad", (-np.pi, np.pi), places=_AXES, of_plate=True)
 GAIN = _Gain("plate_gain", "gain", "1", (-0.5, 1.0))
-CROSSTALK = _Crosstalk("plate_crosstalk", "ratio", "1", (-1.0, 1.0))
+_PAIRS = tuple(f"{a}->{b}" for a in CHANNELS for b in CHANNELS if a != b)
+CROSSTALK = _Crosstalk("plate_crosstalk", "ratio", "1", (-1.0, 1.0), places=_PAIRS)
 OFFSET = _Offset("plate_offset", "offset", "N or N·m", (-2e4, 2e4), lasting=False)
-DELAY = _Delay("time_delay", "delay", "s", (-10.0, 10.0))
+DELAY = _Delay("time_delay", "delay", "s", (-10.0, 10.0), places=("",))
 PLATE_FAULTS: Mapping[str, PlateFault] = MappingProxyType(
     {one.name: one for one in (POSITION, ROTATION, GAIN, CROSSTALK, OFFSET, DELAY)}
 )

@@ -8,7 +8,7 @@ Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -95,19 +95,11 @@ class PlateParameters:
         return f"plate{self.number}"
 
 
-class _DeclaredPlates(NamedTuple):
-    """The ``plates`` that a file and session.toml describe, the reason by number why others are ``refused``, what a
-    person should look at, what was decided without doubt.
-    """
-
-    plates: tuple[PlateParameters, ...]
-    refused: Mapping[int, str]
-    warnings: tuple[str, ...]
-    history: tuple[str, ...]
-
-
-def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array) -> _DeclaredPlates:
-    """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used.
+def declared_plates(
+    raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array
+) -> tuple[list[PlateParameters], dict[int, str], tuple[str, ...], tuple[str, ...]]:
+    """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used; the
+    reason by number why others are refused; what a person should look at; what was decided without doubt.
 
     ``told`` by the plate's name; ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the
     lab.
@@ -125,14 +117,14 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     lacks = lacks if raw.analog.shape[0] else "holds no analog samples"
     if numbers and lacks:
         declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
-        return _DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
+        return [], {}, (*warnings, f"{declared} Export it with the analog data."), history
     plates, refused = [], {}
     for number in numbers:
         try:
             plates.append(plate_parameters(raw, number, more.get(number), metres=metres, turn=turn))
         except TrialRefused as error:
             refused[number] = str(error)
-    return _DeclaredPlates(tuple(plates), refused, warnings, history)
+    return plates, refused, warnings, history
 
 
 def _without_channels(told: Mapping[int, ToldPlate], count: int) -> tuple[str, ...]:
@@ -152,7 +144,13 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
     used = _numbers(group, "USED")
     if not used.size:
         if not types and not _numbers(group, "CHANNEL").size:
-            return 0, _misnamed(raw)
+            # another name of the group is damage, which must not pass in silence
+            other = [name for name, held in raw.parameters.items() if {"CORNERS", "ORIGIN", "CHANNEL"} <= held.keys()]
+            said = (
+                f"The group {', '.join(other[:1])} holds CORNERS, ORIGIN and CHANNEL of force plates but is not called "
+                f"FORCE_PLATFORM: no plate was read. Rename the group, or copy the file again from its source."
+            )
+            return 0, (said,) if other and "FORCE_PLATFORM" not in other else ()
         return types, (f"FORCE_PLATFORM:USED is missing; TYPE lists {types} plates, which were read.",)
     declared = int(used[0]) if np.isfinite(used[0]) and 0 <= used[0] <= 255 else 0
     if declared != used[0]:
@@ -163,17 +161,6 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
     if declared < types:
         return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; {declared} were read.",)
     return declared, ()
-
-
-def _misnamed(raw: RawC3d) -> tuple[str, ...]:
-    """Say which group holds force plates under another name: damage, which must not pass in silence."""
-    other = [name for name, group in raw.parameters.items() if {"CORNERS", "ORIGIN", "CHANNEL"} <= group.keys()]
-    if not other or "FORCE_PLATFORM" in other:
-        return ()
-    return (
-        f"The group {other[0]} holds CORNERS, ORIGIN and CHANNEL of force plates but is not called FORCE_PLATFORM: no "
-        f"plate was read. Rename the group, or copy the file again from its source.",
-    )
 
 
 def plate_parameters(

@@ -14,7 +14,14 @@ import numpy as np
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.upright import movement, steady_mass
 from biodance.lab.plates.corners import ToldPlate
-from biodance.lab.plates.decode import FOOT_HEIGHT, LARGEST_SHARE, PlateReading, decode_plates, left_out_said
+from biodance.lab.plates.decode import (
+    FOOT_HEIGHT,
+    LARGEST_SHARE,
+    PlateReading,
+    block_means,
+    decode_plates,
+    left_out_said,
+)
 from biodance.lab.plates.parameters import POUND, declared_plates
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
 from biodance.records import Array, Defect, Markers, Mask, Plate, Wrench
@@ -41,8 +48,12 @@ coarse converter does at rest, all of them repeat it four times in six of a hund
 def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
     """Return the readings of plates that are not dead, without constants where nobody steps on them; the dead ones."""
     alive, dead = [], []
-    for reading in readings:
-        elsewhere = _borne_elsewhere(reading, [one for one in readings if one is not reading], markers)
+    stood_on = [markers is not None and _feet_on(one, markers) for one in readings]
+    for reading, feet in zip(readings, stood_on, strict=True):
+        # the largest force of another plate with a foot on it; 0 with a foot on this one, or without
+        others = (one for one, on in zip(readings, stood_on, strict=True) if on and not feet)
+        loads = (float(np.abs(one.sensor[:, 2]).max()) for one in others)
+        elsewhere = max((load for load in loads if load > _SOMEBODY), default=0.0)
         constant = _without_offset(reading, elsewhere)
         if why := _why_dead(constant, markers, elsewhere):
             said = left_out_said(reading.plate.number, why)
@@ -50,14 +61,6 @@ def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> t
         else:
             alive.append(constant)
     return alive, dead
-
-
-def _borne_elsewhere(reading: PlateReading, others: Sequence[PlateReading], markers: Markers | None) -> float:
-    """Return the largest force N of another plate with a foot on it; 0 with a foot on this one, or without."""
-    if markers is None or _feet_on(reading, markers):
-        return 0.0
-    loads = [float(np.abs(one.sensor[:, 2]).max()) for one in others if _feet_on(one, markers)]
-    return max((load for load in loads if load > _SOMEBODY), default=0.0)
 
 
 def _feet_on(reading: PlateReading, markers: Markers) -> bool:
@@ -100,11 +103,7 @@ def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) 
 
 def _course(reading: PlateReading, length: float) -> tuple[float, float, float]:
     """Return the mean vertical N, and the sds of its means over ``length`` s and of the worse moment's, N·m."""
-    sensor = reading.sensor[reading.known, 2:5]
-    size = min(max(1, round(length * reading.rate)), len(sensor))
-    count = len(sensor) // size
-    # Means over blocks (count, size, 3), so that noise averages out.
-    means = sensor[: count * size].reshape(count, size, 3).mean(axis=1)
+    means, _ = block_means(reading.sensor[reading.known, 2:5], reading.rate, length=length)
     level, (spread, *wanders) = float(means[:, 0].mean()), means.std(axis=0)
     return level, float(spread), float(max(wanders))
 
@@ -196,20 +195,20 @@ def read_plates(
     raised. The formula per TYPE is in `sensor_wrench`.
     """
     turn = np.eye(3) if turn is None else turn
-    declared = declared_plates(raw, told or {}, metres=metres, turn=turn)
-    decoded, lost, scaled = decode_plates(raw, declared.plates, metres=metres, turn=turn, mass=body_mass)
+    declared, refused, odd, unused = declared_plates(raw, told or {}, metres=metres, turn=turn)
+    decoded, lost, scaled = decode_plates(raw, declared, metres=metres, turn=turn, mass=body_mass)
     readings, beside = with_loads_on_plates(decoded)
-    refused = {**declared.refused, **lost, **beside}
-    warnings = (*declared.warnings, *scaled, *(left_out_said(n, refused[n]) for n in sorted(refused)))
+    refused |= {**lost, **beside}
+    warnings = (*odd, *scaled, *(left_out_said(n, refused[n]) for n in sorted(refused)))
     if not readings:
-        return PlatesRead((), warnings, declared.history)
+        return PlatesRead((), warnings, unused)
     readings, dead = without_dead(readings, markers)
     readings, padded = without_padding(raw, readings, markers)
     start = float(markers.time[0]) if markers is not None and markers.time.size else 0.0
     plates, said = sense_plates(readings, start + np.arange(len(raw.analog)) / raw.analog_rate, markers)
     defects = (*dead, *padded)
     followed = (f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
-    history = (*declared.history, *followed, *(one.text for one in defects))
+    history = (*unused, *followed, *(one.text for one in defects))
     return PlatesRead(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
 
 

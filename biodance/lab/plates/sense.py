@@ -333,7 +333,11 @@ def _in_lab(
             wrench = wrench * np.array([1, 1, 1, 1, 1, -1])
             checked, doubt = _FZ_ALONE, f"{_FZ_ALONE} Check its cabling."
         doubts += [doubt] * bool(doubt)
-    told = (text for text in (*moved, *said, seen, checked, _sign_said(sign, otherwise)) if text)
+    signed = f"Never loaded, so gravity cannot tell the sign; taken as the {'reaction' if otherwise > 0 else 'load'}."
+    if sign:
+        held = "reaction on the subject; kept" if sign > 0 else "load on the plate; turned round"
+        signed = f"Sign: the file holds the {held} (the weight must point up)."
+    told = (text for text in (*moved, *said, seen, checked, signed) if text)
     value = wrench_in_lab(wrench, reading.axes, sign or otherwise, reading.corners.mean(axis=0))
     value[~reading.known] = np.nan
     value.setflags(write=False)  # the record keeps it without a copy
@@ -363,14 +367,6 @@ def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, s
         return f"{said}.", ""
     doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order."
     return doubt, doubt
-
-
-def _sign_said(sign: int, otherwise: int) -> str:
-    if not sign:
-        taken = "reaction" if otherwise > 0 else "load"
-        return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
-    held = "reaction on the subject; kept" if sign > 0 else "load on the plate; turned round"
-    return f"Sign: the file holds the {held} (the weight must point up)."
 
 
 def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers | None) -> tuple[PlateReading, _Said]:
@@ -451,18 +447,13 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
     point, near, feet = cop[seen], near[seen], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[seen]
     # the markers near the plate first, so that no more columns are left than feet were ever seen there
     first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
-    return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
-
-
-def _distances_between(points: Array, feet: Array) -> Array:
-    """Return (F,) m from points (F, 2) to the nearest segment between two of ``feet`` (F, n, 2); inf without any."""
-    i, j = np.triu_indices(feet.shape[1], 1)
-    # From the point to each marker; the distance is that from the origin.
-    away = feet - points[:, None]
+    away = np.take_along_axis(feet, first, axis=1) - point[:, None]
+    i, j = np.triu_indices(away.shape[1], 1)
     with np.errstate(invalid="ignore"):  # feet that are not there give NaN
         x, y = away[:, i, 0], away[:, i, 1]
         ax, ay = away[:, j, 0] - x, away[:, j, 1] - y
         # where on the segment the foot of the perpendicular from the point lies: 0 at one marker, 1 at the other
         share = np.clip(-(x * ax + y * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
         square = (x + share * ax) ** 2 + (y + share * ay) ** 2
-    return np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))
+    # of each frame the nearest segment between two markers; inf without any
+    return float(np.median(np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))))

@@ -80,14 +80,6 @@ def head_text(head: bytes) -> str:
         return ""
 
 
-def _without_origin(trial: Trial) -> Trial:
-    """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
-    if trial.markers is None:
-        return trial
-    xyz, said = unseen_at_origin(trial.markers.xyz)
-    return replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said)) if said else trial
-
-
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 _HEAD = 8192  # Bytes of a file that are looked at to find its reader
 
@@ -107,8 +99,11 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
     found = sniffed(path, head, chosen)
     if found:
         return found
-    extension, legal = path.suffix.lower(), extensions(chosen)
-    data = _subject_data(head)
+    extension, legal, text = path.suffix.lower(), extensions(chosen), head_text(head)
+    # what the head shows of subject data
+    xml, first = "<KinematicModel" in text, text.splitlines()[0] if text else ""
+    notes = ".enf" if re.match(r"\[[\w ]+\]\s*$", first) else ".mp" if re.match(r"\$\w+\s*=", text) else ""
+    data = ".vsk" if xml else notes
     if data or extension in _SUBJECT_DATA:
         raise FileRefused(
             f"{path}: holds {_SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with "
@@ -199,7 +194,11 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(_without_origin(_read(reader, path, role, subject, told)))
+        trial = _read(reader, path, role, subject, told)
+        if trial.markers is not None:
+            xyz, said = unseen_at_origin(trial.markers.xyz)
+            trial = replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said))
+        trial = without_frozen(trial)
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise
@@ -217,13 +216,3 @@ def _read(reader: Reader, path: Path, role: Role, subject: str | None, told: Tol
     if getattr(reader, "FOLLOWS_TOLD", False):
         return reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
     return as_told(reader.read(path, role=role, subject=subject), told)
-
-
-def _subject_data(head: bytes) -> str:
-    """Return the extension of the subject data that a head shows; "" for none."""
-    text = head_text(head)
-    if "<KinematicModel" in text:
-        return ".vsk"
-    if re.match(r"\[[\w ]+\]\s*$", text.splitlines()[0] if text else ""):
-        return ".enf"
-    return ".mp" if re.match(r"\$\w+\s*=", text) else ""

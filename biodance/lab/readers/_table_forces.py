@@ -95,7 +95,16 @@ def table_plates(
     said = [told.plates.get(f"plate{number}", NOTHING_TOLD) for number in range(1, len(loads) + 1)]
     history = [f"plate{n} was left out, as session.toml says." for n, one in enumerate(said, 1) if not one.use]
     used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
-    placed = [_at_corners(n, load, one.corners, time) for n, load, one in used if one.corners is not None]
+    placed = []
+    for n, load, one in used:
+        if one.corners is not None:
+            # along the plate's own axes, about its centre
+            turned, zero, zeroed = _zeroed(_turned(load.value, plate_axes(one.corners)), time)
+            signed, sign = _upright(turned)
+            wrench = Wrench(time, wrench_about_origin(signed, one.corners.mean(axis=0)))
+            about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
+            decided = (about, zeroed, sign)
+            placed.append(Plate(f"plate{n}", 0, one.corners, wrench, decided, zero, columns=load.columns))
     free = [(n, load) for n, load, one in used if one.corners is None]
     if free:
         feet = _feet(markers, worn)
@@ -136,16 +145,9 @@ def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
     return value - reads, reads[:3], said
 
 
-def _at_corners(number: int, load: Load, corners: Array, time: Array) -> Plate:
-    """Return the plate whose ``corners`` (4, 3) m are told: wrench along its own axes, about its centre."""
-    axes, centre = plate_axes(corners), corners.mean(axis=0)
-    # R v of every row: plate axes to the lab.
-    turned = np.hstack([load.value[:, :3] @ axes.T, load.value[:, 3:] @ axes.T])
-    turned, zero, zeroed = _zeroed(turned, time)
-    signed, said = _upright(turned)
-    wrench = Wrench(time, wrench_about_origin(signed, centre))
-    about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
-    return Plate(f"plate{number}", 0, corners, wrench, (about, zeroed, said), zero, columns=load.columns)
+def _turned(value: Array, turn: Array) -> Array:
+    """Return forces and moments (T, 6) along the axes that ``turn`` (3, 3) leads to."""
+    return np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T])
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +194,7 @@ def _pressure(value: Array) -> Array:
 
 def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> PlatesRead:
     """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
-    turned = [np.hstack([load.value[:, :3] @ turn.T, load.value[:, 3:] @ turn.T]) for _, load in free]
-    zeroed = [_zeroed(value, time) for value in turned]
+    zeroed = [_zeroed(_turned(load.value, turn), time) for _, load in free]
     signed = [_upright(value) for value, _, _ in zeroed]
     total = np.sum([value for value, _ in signed], axis=0)
     # The place is told by the total: which foot is on which plate does not matter.

@@ -56,7 +56,10 @@ def _settings(header: list[str], values: Array, path: Path) -> tuple[dict[str, A
         todo = f"Write the file {beside.name} beside it and correct what is not so:\n{_example(values, found)}"
         raise FileRefused(f"{path}: does not say {', '.join(lacking)}. {todo}")
     _refuse_nonsense(found, values, beside if given else path)
-    _refuse_other_clock(values, columns, float(found["rate_hz"]), path)
+    own, rate = _rate(values, columns), float(found["rate_hz"])
+    if "time_s" in columns and (own is None or abs(own - rate) > _EVEN * rate):
+        has = "goes in unequal steps" if own is None else f"goes at {own:g} Hz"
+        raise FileRefused(f"{path}: the time column {has}, {rate:g} Hz are declared. Export it again, or correct that.")
     return found, beside if given else None
 
 
@@ -118,16 +121,6 @@ def _rate(values: Array, columns: list[str]) -> float | None:
     step = (time[-1] - time[0]) / (time.size - 1)
     even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(_EVEN * step, 0.0005)
     return round(1 / step, 3) if even else None
-
-
-def _refuse_other_clock(values: Array, columns: list[str], rate: float, path: Path) -> None:
-    """Refuse a table whose own time column goes in other steps than ``rate`` Hz."""
-    if "time_s" not in columns or columns.index("time_s") >= values.shape[1]:
-        return
-    own = _rate(values, columns)
-    if own is None or abs(own - rate) > _EVEN * rate:
-        has = "goes in unequal steps" if own is None else f"goes at {own:g} Hz"
-        raise FileRefused(f"{path}: the time column {has}, {rate:g} Hz are declared. Export it again, or correct that.")
 
 
 def _given(beside: Path) -> dict[str, Any]:

@@ -82,7 +82,16 @@ def _parse_bsf(content: bytes, path: Path) -> tuple[Any, list[_BsfPlate], int]:
                 f"instead."
             )
         block = data[:, first[i] : first[i] + 6].astype(float)
-        factor = _counts_to_pounds(header, i + 1, path) if version == 100 else np.ones(6)
+        factor = np.ones(6)
+        if version == 100:  # lbf, in·lbf a count
+            told = ("sensitivity", "gain", "excitation", "counts_per_volt")
+            product = np.prod([header[name][:6].astype(float) for name in told], axis=0)
+            if not ((np.abs(product) <= LARGEST_NUMBER**2) & (np.abs(product) >= 1 / LARGEST_NUMBER)).all():
+                raise FileRefused(
+                    f"{path}: plate {i + 1} holds ADC counts but a calibration value is 0 or no number. Enter the "
+                    f"calibration in NetForce and save again."
+                )
+            factor = _MICROVOLT / product
         model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
         size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
         offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
@@ -158,19 +167,6 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
     return data
 
 
-def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
-    """Return (6,) lbf, in·lbf a count: 1e6 / (sensitivity * gain * excitation * counts per volt)."""
-    product = np.prod(
-        [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
-    )
-    if not (np.abs(product) <= LARGEST_NUMBER**2).all() or (np.abs(product) < 1 / LARGEST_NUMBER).any():
-        raise FileRefused(
-            f"{path}: plate {number} holds ADC counts but a calibration value is 0 or no number. Enter the "
-            f"calibration in NetForce and save again."
-        )
-    return _MICROVOLT / product
-
-
 _LIGHTEST, _HEAVIEST = 10.0, 300.0  # kg
 
 
@@ -205,8 +201,15 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     if others:
         history.append(f"{others} channels of other instruments were not read.")
     source = Source(path, sha256(content), f"AMTI .bsf {version}", analog_rate=rate)
-    told = (_measurements(main), tuple(history), tuple(warnings))
-    return Trial(path.stem, role, None, tuple(plates), source, "", *told)
+    # the subject's mass (kg) and height (m), where they make sense
+    mass, height = float(main["weight"]), float(main["height"])
+    if not int(main["metric"]):
+        mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
+    elif height > 3:
+        height /= 100
+    measures = {"Bodymass": mass} if _LIGHTEST <= mass <= _HEAVIEST else {}
+    measures |= {"Height": height} if 0.5 <= height <= 2.5 else {}
+    return Trial(path.stem, role, None, tuple(plates), source, "", measures, tuple(history), tuple(warnings))
 
 
 def _refuse_nonsense(plate: _BsfPlate, number: int, path: Path) -> None:
@@ -233,15 +236,3 @@ def _placed(plate: _BsfPlate, number: int) -> str:
         f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
         f"says. Check that."
     )
-
-
-def _measurements(main: Any) -> dict[str, float]:
-    """Return the subject's mass (kg) and height (m) from the header where they make sense."""
-    mass, height = float(main["weight"]), float(main["height"])
-    if not int(main["metric"]):
-        # Weight in pounds to N, over g.
-        mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
-    elif height > 3:
-        height /= 100
-    found = {"Bodymass": mass} if _LIGHTEST <= mass <= _HEAVIEST else {}
-    return found | ({"Height": height} if 0.5 <= height <= 2.5 else {})

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -179,7 +179,12 @@ def _rows(table: TimeTable, columns: dict[str, str], where: str) -> _Rows:
 
 def _in_newton_metres(rows: Mapping[str, _Rows]) -> tuple[dict[str, _Rows], tuple[str, ...]]:
     """Return the plates with torques in N·m, and the warning where they were written in N·mm."""
-    turned = _turning_arm(rows.values())
+    force, torque = (np.concatenate([getattr(one, what) for one in rows.values()]) for what in ("force", "torque"))
+    size = np.linalg.norm(force, axis=1)
+    loaded = size >= COP_FORCE
+    along = (force * torque).sum(axis=1)[loaded] / size[loaded]
+    # RMS moment along the force over the RMS force of loaded rows, m
+    turned = float(np.sqrt((along**2).mean() / (size[loaded] ** 2).mean())) if loaded.any() else 0.0
     if not _TURNED_BY < turned <= 1000 * _TURNED_BY:
         return dict(rows), ()
     said = (
@@ -188,17 +193,6 @@ def _in_newton_metres(rows: Mapping[str, _Rows]) -> tuple[dict[str, _Rows], tupl
         f"N mm. Export them in N m."
     )
     return {name: replace(one, torque=one.torque / 1000, said=(said,)) for name, one in rows.items()}, (said,)
-
-
-def _turning_arm(plates: Iterable[_Rows]) -> float:
-    """Return the RMS moment along the force (N·m) over the RMS force (N) of loaded rows, m; 0 without load."""
-    force, torque = (np.concatenate(some) for some in zip(*((one.force, one.torque) for one in plates), strict=True))
-    size = np.linalg.norm(force, axis=1)
-    loaded = size >= COP_FORCE
-    if not loaded.any():
-        return 0.0
-    along = (force * torque).sum(axis=1)[loaded] / size[loaded]
-    return float(np.sqrt((along**2).mean() / (size[loaded] ** 2).mean()))
 
 
 def _zeroed(rows: _Rows, time: Array, turn: Array) -> _Rows:

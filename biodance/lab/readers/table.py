@@ -214,7 +214,10 @@ def columns_in(labels: Sequence[str]) -> TableColumns:
     """Return what the columns with these ``labels`` hold."""
     times = ((k, match[1] or "") for k, label in enumerate(labels) if (match := _TIME.fullmatch(label)))
     time, unit = next(times, (None, ""))
-    forces = [_as_channel(label) for label in labels]
+    # Force_X_1 is FX_1, Tz is Mz
+    forces = [
+        _TURNED.sub(lambda m: ("F" if (m[1] or "").lower() == "force" else "M") + (m[2] or m[4]), x) for x in labels
+    ]
     plates = tuple(group for group in channel_groups(forces) if len(group) == 6)
     taken = {time, *chain(*plates)}
     free = [k for k in range(len(labels)) if k not in taken]
@@ -230,11 +233,6 @@ def columns_in(labels: Sequence[str]) -> TableColumns:
 def _with_all_axes(found: Mapping[str, Mapping[str, int]]) -> dict[str, tuple[int, int, int]]:
     """Return the columns of x, y, z of the markers of which none is missing."""
     return {name: (axes["x"], axes["y"], axes["z"]) for name, axes in found.items() if len(axes) == 3}
-
-
-def _as_channel(label: str) -> str:
-    """Return the label of a force column as ``Fx``, ``Mz`` with what else it says: Force_X_1 is FX_1, Tz is Mz."""
-    return _TURNED.sub(lambda m: ("F" if (m[1] or "").lower() == "force" else "M") + (m[2] or m[4]), label)
 
 
 def _triples(
@@ -295,7 +293,8 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     time_axis(stamps, where=str(path))  # refuses stamps that are none
     rows, lengths, turn = _markers(cells, columns, stamps, path)
     instants, arrived = camera_instants(stamps, rows.xyz)
-    axis, rows = time_axis(instants, where=str(path)).from_zero(), replace(rows, time=instants)
+    axis, rows = time_axis(instants, where=str(path)), replace(rows, time=instants)
+    axis = replace(axis, stamps=axis.stamps - axis.time[0], time=axis.time - axis.time[0])
     loads, weighed = loads_of(columns.plates, cells.labels, cells.units, cells.values)
     known = recognise(rows.names)
     guess = "" if known else guess_set(rows).name

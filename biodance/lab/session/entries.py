@@ -4,7 +4,7 @@ left out; strikes and offs by hand; what somebody wears.
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, isfinite
@@ -21,7 +21,6 @@ from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT, channel_groups, plate_parameters
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Plate, Session, Trial
-from biodance.records.attention import Doubt
 
 _KINDS = {"strike": True, "off": False}
 _KEYS = ("side", "kind", "time")
@@ -225,46 +224,30 @@ def within(time: Array, start: float, end: float) -> Mask:
     return (time >= start) & (time <= end)
 
 
-def unused_labels(dropped: Sequence[str], known: Collection[str]) -> list[str]:
-    """Return a sentence for each dropped label that is not ``known`` from any trial: most often a slip of the pen."""
-    return [Doubt(f"[markers] drop names {one!r}, which no trial has") for one in dropped if one not in known]
-
-
 _LIMBS = tuple(name for name in MARKED_SEGMENTS if name.startswith(("right_", "left_")))
 _HEAVIEST = 30.0
 """kg that a device may weigh: more is in grams, or no device."""
 
 
-def legal_prosthesis(segment: str | None) -> str:
-    """Return the segment that a prosthesis begins with, "" for None.
+def refuse_worn(prosthesis: str | None, devices: Mapping[str, float]) -> None:
+    """Refuse the segment that a prosthesis begins with, and what is worn in kg by segment, where they are not legal.
 
     Raises
     ------
     SessionRefused
-        It is no segment of an arm or leg; the message lists them.
+        A prosthesis begins with no segment of an arm or leg, there is no such segment to wear something on, or the mass
+        is none of a device.
     """
-    if segment and segment not in _LIMBS:
-        told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", segment, _LIMBS)
+    if prosthesis and prosthesis not in _LIMBS:
+        told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", prosthesis, _LIMBS)
         raise SessionRefused(f"[subject] prosthesis: {told}")
-    return segment or ""
-
-
-def legal_devices(given: Mapping[str, float]) -> dict[str, float]:
-    """Return what is worn, kg by segment.
-
-    Raises
-    ------
-    SessionRefused
-        There is no such segment, or the mass is none of a device.
-    """
-    for segment, mass in given.items():
+    for segment, mass in devices.items():
         if segment not in MARKED_SEGMENTS:
             raise SessionRefused(f"[devices] {UnknownName.of('segment', segment, MARKED_SEGMENTS)}")
         if not 0 < mass <= _HEAVIEST:
             raise SessionRefused(
                 f"[devices] {segment} = {mass:g} kg is no device. Legal: above 0 and at most {_HEAVIEST:g} kg."
             )
-    return dict(given)
 
 
 _ORDER = "in the order +x+y, -x+y, -x-y, +x-y of the plate's own axes"
@@ -295,14 +278,18 @@ def told_plate(name: str, entry: PlateEntry) -> ToldPlate:
     if not re.fullmatch(r"plate[1-9]\d?", name):
         raise SessionRefused(f"[plates.{name}] is no plate. Legal names are plate1, plate2 ..., as inspect shows them.")
     where = f"[plates.{name}]"
-    kind = _type(entry.type, where)
-    channels = _channels(entry.channels, kind, where)
+    kind = entry.type
+    if kind is not None and (type(kind) not in (int, float) or kind not in CHANNELS_OF_TYPE):
+        legal = ", ".join(map(str, CHANNELS_OF_TYPE))
+        raise SessionRefused(f"{where} type = {kind!r} is not legal. Legal are the TYPEs {legal} of the C3D standard.")
+    kind = None if kind is None else int(kind)
+    channels = None if entry.channels is None else _channels(entry.channels, kind, where)
     return ToldPlate(
-        corners=_corners(entry.corners_m, where),
+        corners=None if entry.corners_m is None else _corners(entry.corners_m, where),
         type=kind,
         channels=channels,
-        sensitivity=_sensitivity(entry.sensitivity, kind, channels, where),
-        origin=_origin(entry.origin_m, where),
+        sensitivity=None if entry.sensitivity is None else _sensitivity(entry.sensitivity, kind, channels, where),
+        origin=None if entry.origin_m is None else _origin(entry.origin_m, where),
         foot=entry.foot or "",
         use=entry.use is not False,
     )
@@ -318,9 +305,7 @@ def _numbers(value: Any, where: str, legal: str) -> Array:
     return numbers
 
 
-def _corners(value: Any, where: str) -> Array | None:
-    if value is None:
-        return None
+def _corners(value: Any, where: str) -> Array:
     legal = f"four points [x, y, z] in m in the lab frame (z up), {_ORDER}"
     corners = _numbers(value, f"{where} corners_m", legal)
     if corners.shape != (4, 3):
@@ -338,18 +323,7 @@ def _corners(value: Any, where: str) -> Array | None:
         raise SessionRefused(f"{where} {said}") from None
 
 
-def _type(value: Any, where: str) -> int | None:
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or value not in CHANNELS_OF_TYPE:
-        legal = ", ".join(map(str, CHANNELS_OF_TYPE))
-        raise SessionRefused(f"{where} type = {value!r} is not legal. Legal are the TYPEs {legal} of the C3D standard.")
-    return int(value)
-
-
-def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...] | None:
-    if value is None:
-        return None
+def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...]:
     legal = 'labels or numbers of analog channels, from 1: ["Fx1", "Fy1", ...] or [1, 2, 3, 4, 5, 6]'
     listed = value if isinstance(value, list) else [None]
     channels: list[Any] = [int(c) if isinstance(c, float) and c == round(c) and c >= 1 else c for c in listed]
@@ -363,10 +337,8 @@ def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...]
     return tuple(channels)
 
 
-def _sensitivity(value: Any, kind: int | None, channels: tuple[str | int, ...] | None, where: str) -> Array | None:
+def _sensitivity(value: Any, kind: int | None, channels: tuple[str | int, ...] | None, where: str) -> Array:
     """Return the matrix (rows, channels) of a list of numbers, which is its diagonal, or of a list of rows."""
-    if value is None:
-        return None
     columns = CHANNELS_OF_TYPE[kind] if kind else len(channels or ()) or 6
     rows = len(CONTENT[kind]) if kind else columns
     legal = (
@@ -382,9 +354,7 @@ def _sensitivity(value: Any, kind: int | None, channels: tuple[str | int, ...] |
     return matrix
 
 
-def _origin(value: Any, where: str) -> Array | None:
-    if value is None:
-        return None
+def _origin(value: Any, where: str) -> Array:
     legal = f"[x, y, z] in m from the sensor to the centre of the surface, z up to {DEEPEST:g} m, plate axes"
     origin = _numbers(value, f"{where} origin_m", legal)
     if origin.shape != (3,) or abs(origin[2]) > DEEPEST or np.abs(origin).max() > LONGEST_SIDE:

@@ -62,11 +62,10 @@ from biodance.lab.plates.corners import Told, ToldPlate
 from biodance.lab.session.entries import (
     PlateEntry,
     TrialParts,
-    legal_devices,
     legal_events,
     legal_exchanges,
-    legal_prosthesis,
     legal_spans,
+    refuse_worn,
     told_plate,
 )
 from biodance.library import locate, parse_toml, read_toml
@@ -108,21 +107,16 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
             )
         if f"{side}{name}" in found:
             raise SessionRefused(f"girths_cm: {side}{name} is given twice (also as {said!r}). Keep one of the two.")
-        _refuse_impossible(said, value, usual_girths()[name])
+        usual = usual_girths()[name]
+        low, high = (share * usual for share in _LEGAL)
+        if not low <= value <= high:
+            units = {"mm": value / 10, "m": value * 100, "inch": value * 2.54}
+            unit = next((unit for unit, one in units.items() if 0.6 * usual <= one <= 1.6 * usual), "")
+            hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again, in cm."
+            legal_cm = f"{100 * low:.0f} to {100 * high:.0f} cm"
+            raise SessionRefused(f"girths_cm: {said} = {100 * value:g} cm is no person's. Legal: {legal_cm}.{hint}")
         found[f"{side}{name}"] = float(value)
     return found
-
-
-def _refuse_impossible(said: str, value: float, usual: float) -> None:
-    low, high = (share * usual for share in _LEGAL)
-    if low <= value <= high:
-        return
-    units = {"mm": value / 10, "m": value * 100, "inch": value * 2.54}
-    unit = next((unit for unit, one in units.items() if 0.6 * usual <= one <= 1.6 * usual), "")
-    hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again, in cm."
-    raise SessionRefused(
-        f"girths_cm: {said} = {100 * value:g} cm is no person's. Legal: {100 * low:.0f} to {100 * high:.0f} cm.{hint}"
-    )
 
 
 _LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}  # m
@@ -328,22 +322,21 @@ class SessionFile:
         exact = [entry for key, entry in self.trials if key.lower() == name.lower()]
         return exact + [entry for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
 
-    def unused(self, names: list[str]) -> list[str]:
-        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
-        pen. A pattern (``squat*``) is for what there may be.
+    def unused(self, names: list[str], plates: set[str], labels: set[str]) -> list[str]:
+        """Return a sentence for each entry that fits nothing of the session, most often a slip of the pen: keys of
+        ``[trials]`` that fit no trial among the ``names``, each with the closest (a pattern, ``squat*``, is for what
+        there may be); ``[plates.NAME]`` of no plate that was read; dropped labels that no trial has.
         """
         said: list[str] = []
         for key, _ in self.trials:
             if not set(key) & set("*?[") and not any(fnmatchcase(name.lower(), key.lower()) for name in names):
                 hint = did_you_mean(key, names)
                 said.append(Doubt(f"[trials.{key}] fits no recording of the session", hint.strip()))
-        return said
-
-    def unused_plates(self, names: set[str]) -> list[str]:
-        """Return a sentence for each ``[plates.NAME]`` that fits none of the plates that were read."""
-        idle = [name for name, plate in self.plates.items() if plate.use and name not in names]
-        legal = f"The plates read are {', '.join(sorted(names))}." if names else "No plate was read."
-        return [Doubt(f"[plates.{name}] fits no plate of the session", legal) for name in idle]
+        idle = [name for name, plate in self.plates.items() if plate.use and name not in plates]
+        legal = f"The plates read are {', '.join(sorted(plates))}." if plates else "No plate was read."
+        said += [Doubt(f"[plates.{name}] fits no plate of the session", legal) for name in idle]
+        absent = [one for one in self.dropped if one not in labels]
+        return said + [Doubt(f"[markers] drop names {one!r}, which no trial has") for one in absent]
 
 
 def read_session_file(folder: Path) -> SessionFile:
@@ -428,7 +421,7 @@ def _checked(path: Path, raw: dict[str, Any]) -> _Contents:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
     try:
         _ = [told_plate(name, entry) for name, entry in found.plates.items()]
-        _ = legal_prosthesis(found.subject.prosthesis), legal_devices(found.devices)
+        refuse_worn(found.subject.prosthesis, found.devices)
         for one in found.trials.values():
             _ = legal_exchanges(one.exchange), legal_spans(one.leave_out), legal_events(one.events)
     except SessionRefused as error:

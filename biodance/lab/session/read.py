@@ -16,7 +16,7 @@ from biodance.lab.plates.corners import one_place
 from biodance.lab.readers import Reader, extensions, read_trial
 from biodance.lab.session import recordings
 from biodance.lab.session.archive import visit_date
-from biodance.lab.session.entries import unused_labels, with_parts_corrected
+from biodance.lab.session.entries import with_parts_corrected
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
 from biodance.lab.session.subject import identify_subject
 from biodance.records import Role, Session, Trial
@@ -150,9 +150,8 @@ def read_session(
     subject, guesses = identify_subject(file_says.subject, measurements, trials, name=called, devices=file_says.devices)
     read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
-    slips = file_says.unused([file.stem for file in files])
-    slips += file_says.unused_plates({plate.name for trial in trials for plate in trial.plates})
-    slips += unused_labels(file_says.dropped, labels)
+    plates = {plate.name for trial in trials for plate in trial.plates}
+    slips = file_says.unused([file.stem for file in files], plates, labels)
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 
@@ -174,7 +173,10 @@ def _role(
     """Return the role of a recording and why it has it."""
     if role := settings.role(file.stem):
         return role, "session.toml says so"
-    if operator and (role := recordings.role_by_eclipse(operator)):
+    # TYPE Static, else the words of the description as in a name
+    if operator and "static" in operator.type.lower():
+        return "static", "the Eclipse notes (.enf) say so"
+    if operator and (role := recordings.role_by_name(operator.description)):
         return role, "the Eclipse notes (.enf) say so"
     if role := recordings.role_by_name(file.stem):
         return role, "guessed from its name"
@@ -202,7 +204,11 @@ def _settle_static(
             )
     if any(trial.role == "static" for trial in trials):
         return trials
-    guess = recordings.guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
+    # of the still ones that with the most markers; a single frame, which some laboratories keep, counts as still
+    asked = (trial for trial in trials if settings.role(trial.source.path.stem) is None)
+    still = [(trial, trial.markers) for trial in asked if trial.markers is not None and is_still(trial)]
+    quality = [(int(markers.seen.any(axis=0).sum()), -movement(markers)) for _, markers in still]
+    guess = still[quality.index(max(quality))][0] if still else None
     if guess is None or guess.markers is None:
         notes.append(
             "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it "

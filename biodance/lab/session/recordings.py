@@ -20,7 +20,6 @@ import numpy as np
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused, SessionRefused
-from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.plain_text import COMMAS_READ, decode, parse_number, read_bytes, read_text
 from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
@@ -169,22 +168,6 @@ def role_by_name(name: str) -> Role | None:
     return None
 
 
-def role_by_eclipse(notes: EclipseNotes) -> Role | None:
-    """Return the role that the operator's notes tell: TYPE Static, else the words of the description as in a name."""
-    return "static" if "static" in notes.type.lower() else role_by_name(notes.description)
-
-
-def guess_static(trials: Sequence[Trial]) -> Trial | None:
-    """Return the trial to take as static where nobody said which: of the still ones that with the most markers; None if
-    all move.
-
-    A single frame counts as still: some laboratories keep one frame of the static only.
-    """
-    still = [(trial, trial.markers) for trial in trials if trial.markers is not None and is_still(trial)]
-    quality = [(int(markers.seen.any(axis=0).sum()), -movement(markers)) for _, markers in still]
-    return still[quality.index(max(quality))][0] if still else None
-
-
 TEXT = (".txt", ".csv", ".tsv")
 """Extensions that notes and tables for people have, too: there the content decides."""
 RESULTS = ("results.json", "report.html", "results.partial.json")
@@ -261,7 +244,8 @@ def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
     """Return the files directly in a folder whose extension or content says they are recordings, by name."""
     legal = extensions(readers)
     files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
-    return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
+    found = [path for path in files if path.suffix.lower() in legal]
+    return [path for path in found if path.suffix.lower() not in TEXT or _is_data(path, readers)]
 
 
 def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
@@ -293,9 +277,7 @@ def _without_companions(files: list[Path], readers: Chosen[Reader]) -> list[Path
 
 
 def _is_data(file: Path, readers: Chosen[Reader]) -> bool:
-    """Return False for .txt and .csv files whose content is no recording: notes, exports for people."""
-    if file.suffix.lower() not in TEXT:
-        return True
+    """Return whether the content of a .txt or .csv file is a recording: no notes, no export for people."""
     try:
         return sniffed(file, read_head(file), readers) is not None
     except BiodanceError:

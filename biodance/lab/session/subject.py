@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -56,14 +56,18 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     """
     at = _places(trial)
     ankles = _mean(at, tuple(f"{side}_ankle_lateral" for side in SIDES))
-    rise, doubt = _shoulder_rise(at)
+    # the share of the stature by which lifted arms raise the acromion markers, known to half
+    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
+    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
+    angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
+    rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
         height = _mean(at, landmarks)[2] - ankles[2]
         if math.isfinite(height) and height > 0:
             lifted = landmarks[0].endswith("acromion")
             told.append(height / (share + rise * lifted))
-            spread.append(math.hypot(sd, doubt / share * lifted))
+            spread.append(math.hypot(sd, rise / 2 / share * lifted))
             names.append(name)
     if not told:
         return math.nan, math.nan, ""
@@ -114,15 +118,6 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
     return np.mean([at.get(name, np.full(3, np.nan)) for name in landmarks], axis=0)
 
 
-def _shoulder_rise(at: Mapping[str, Array]) -> tuple[float, float]:
-    """Return by which share of the stature lifted arms raise the acromion markers, and its standard deviation."""
-    ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
-    arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
-    angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
-    rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
-    return rise, rise / 2
-
-
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
 _MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
 _STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
@@ -135,12 +130,8 @@ _MIDDLE_INDEX = 22.5
 """kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
 
 
-@dataclass(frozen=True)
-class _Declared:
-    """One declared number and where it stands."""
-
-    value: float
-    source: str
+_Declared = tuple[float, str]
+"""One declared number and where it stands."""
 
 
 def identify_subject(
@@ -164,11 +155,11 @@ def identify_subject(
     masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
     mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
-    told = next((one.value for one in _declared(sources, _SEX_NAMES, (0.0, 1.0)) if one.value in (0.0, 1.0)), None)
+    told = next((value for value, _ in _declared(sources, _SEX_NAMES, (0.0, 1.0)) if value in (0.0, 1.0)), None)
     declared: Literal["F", "M"] | None = None if told is None else "M" if told else "F"  # files hold it as 0 or 1
     sex = typed.sex or declared
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
-    on_plates = [_Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
+    on_plates = [(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     mass = _middle_mass(mass, stature, trials, notes)
@@ -188,16 +179,16 @@ def identify_subject(
 
 def declared_mass(measurements: Mapping[str, float]) -> float:
     """Return the body mass (kg) among the measurements of one file; NaN if it is not there or outside 5 to 400 kg."""
-    return next((d.value for d in _declared({"": measurements}, _MASS_NAMES, _LEGAL_MASS)), math.nan)
+    return next((value for value, _ in _declared({"": measurements}, _MASS_NAMES, _LEGAL_MASS)), math.nan)
 
 
 def declared_stature(measurements: Mapping[str, float]) -> float:
     """Return the stature (m) among the measurements of one file; NaN if it is not there or outside 0.4 to 2.6 m."""
-    return next((d.value for d in _declared({"": measurements}, _STATURE_NAMES, _LEGAL_STATURE)), math.nan)
+    return next((value for value, _ in _declared({"": measurements}, _STATURE_NAMES, _LEGAL_STATURE)), math.nan)
 
 
 def _typed(value: float | None) -> list[_Declared]:
-    return [] if value is None else [_Declared(value, "session.toml")]
+    return [] if value is None else [(value, "session.toml")]
 
 
 def _declared(
@@ -209,7 +200,7 @@ def _declared(
         lower = {key.lower(): value for key, value in values.items()}
         value = next((lower[name] for name in names if name in lower), math.nan)
         if legal[0] <= value <= legal[1]:
-            found.append(_Declared(value, source))
+            found.append((value, source))
     return found
 
 
@@ -217,14 +208,13 @@ def _choose(quantity: str, unit: str, declared: list[_Declared], notes: list[str
     """Return the first declared value, NaN without one, and note the first that contradicts it."""
     if not declared:
         return math.nan
-    first = declared[0]
-    other = next((d for d in declared[1:] if abs(d.value - first.value) > _SAME_MASS * first.value), None)
-    if other:
+    (first, source), *others = declared
+    for other, elsewhere in [one for one in others if abs(one[0] - first) > _SAME_MASS * first][:1]:
         notes.append(
-            f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in {other.source}; "
-            "the first was used. Are all files of the same person and day?"
+            f"The {quantity} is {first:g} {unit} in {source} but {other:g} {unit} in {elsewhere}; the first was used. "
+            "Are all files of the same person and day?"
         )
-    return first.value
+    return first
 
 
 def _with_devices(mass: float, devices: Mapping[str, float], notes: list[str]) -> float:
@@ -240,19 +230,16 @@ def _check_mass(mass: float, on_plates: list[_Declared], notes: list[str]) -> fl
     """Return the declared mass, else the one on the plates; note the guess and what contradicts it."""
     if not on_plates:
         return mass
-    first = on_plates[0]
     if math.isnan(mass):
-        mass = first.value
+        mass, where = on_plates[0]
         notes.append(
-            f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in "
-            f"{first.source}."
+            f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in {where}."
         )
-    other = next((found for found in on_plates if abs(found.value - mass) > CheckLimits.mass / 100 * mass), None)
-    if other:
+    far = [one for one in on_plates if abs(one[0] - mass) > CheckLimits.mass / 100 * mass]
+    for other, where in far[:1]:
         notes.append(
-            f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is "
-            f"{mass:.2f} kg. Check the entry, the plates, whether both feet stand on them, and whether it is the same "
-            "person."
+            f"The plates carry {other:.2f} kg in quiet standing in {where}, but the body mass is {mass:.2f} kg. Check "
+            "the entry, the plates, whether both feet stand on them, and whether it is the same person."
         )
     return mass
 

@@ -203,10 +203,14 @@ def write_registered(
         The two share no time.
     """
     assert trial.markers is not None
-    markers, recordings, rate = _common(trial.markers, plates)
-    path = folder / f"{trial.source.path.stem}.c3d"
+    markers, recorded, rate = _common(trial.markers, plates)
+    path, first = folder / f"{trial.source.path.stem}.c3d", trial.source.first_frame
+    first += int(np.searchsorted(trial.markers.time, markers.time[0]))
+    typed = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
     with whole_folder(folder, over=True) as part:
-        _write_registered(part, session, trial, (markers, recordings, rate))
+        c3d = part / path.name
+        write_c3d(c3d, markers=markers, plates=recorded, analog_rate=rate, parameters=typed, first_frame=first)
+        _copy_beside(session, trial, part)
         (part / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
         # What lies in the folder of an earlier registration and was not written by it.
         inside = sorted(folder.iterdir()) if folder.is_dir() else []
@@ -218,15 +222,8 @@ def write_registered(
     return path
 
 
-def _write_registered(
-    folder: Path, session: Session, trial: Trial, recorded: tuple[Markers, list[PlateRecording], float]
-) -> None:
-    markers, recordings, rate = recorded
-    assert trial.markers is not None
-    path = folder / f"{trial.source.path.stem}.c3d"
-    first = trial.source.first_frame + int(np.searchsorted(trial.markers.time, markers.time[0]))
-    said_of = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
-    write_c3d(path, markers=markers, plates=recordings, analog_rate=rate, parameters=said_of, first_frame=first)
+def _copy_beside(session: Session, trial: Trial, folder: Path) -> None:
+    """Copy the static trials and the subject's files of a session, without what they say of the plates."""
     own = trial.source.path.parent
     for static in session.of_role("static"):
         if static.source.path != trial.source.path:

@@ -10,7 +10,7 @@ from biodance.cycles.cut import PERCENT
 from biodance.cycles.scores import NormalCurve
 from biodance.cycles.summary import Repetitions
 from biodance.display import GREY, spaced
-from biodance.records import SIDES, Array
+from biodance.records import SIDES
 from biodance.report.figures import vector as svg
 from biodance.report.wording import format_number
 
@@ -58,6 +58,9 @@ def repetitions_figure(
     gait's own mean where the files hold it, before the ``normal`` bands; "" where none is known.
     """
     groups = [one for one in found.groups if np.isfinite(one.mean).any()]
+    # where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side
+    offs = [(found.off(side), _LOOKS[side]) for side in (SIDES if found.kind == "gait" else ("middle",))]
+    rules = [(off.mean, svg.Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
     cells = []
     for quantity in quantities:
         same = sorted((one for one in groups if one.quantity == quantity), key=lambda one: list(_LOOKS).index(one.side))
@@ -70,21 +73,13 @@ def repetitions_figure(
                 if one.quantity == quantity
             ]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
-            cells.append(
-                [svg.Strip(curve_title(same[0]), [*usual, *_curves(same), *theirs], least=least, rules=_offs(found))]
-            )
+            curves = [*usual, *_curves(same), *theirs]
+            cells.append([svg.Strip(curve_title(same[0]), curves, least=least, rules=rules)])
     if not cells:
         return ""
     people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
     band = f"one sd between cycles{people}"
     return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
-
-
-def _offs(found: Repetitions) -> list[tuple[float, svg.Stroke]]:
-    """Return where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side."""
-    sides = SIDES if found.kind == "gait" else ("middle",)
-    offs = [(found.off(side), _LOOKS[side]) for side in sides]
-    return [(off.mean, svg.Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
 
 
 def curve_title(group: CurveGroup) -> str:
@@ -110,7 +105,12 @@ def pressure_figure(found: Repetitions) -> str:
     """Return the mean way of the pressure along each sole, from the heel up; "" where none is known."""
     ways = {}
     for side in SIDES:
-        same = {one.quantity: _of_most(one) for one in found.groups if one.side == side}
+        # the mean where at least half of the cycles are known: elsewhere it is of another few
+        same = {
+            one.quantity: np.where(2 * np.isfinite(one.values).sum(axis=0) >= len(one.values), one.mean, np.nan)
+            for one in found.groups
+            if one.side == side
+        }
         if "pressure_ahead" in same:
             ways[side] = 1000 * np.stack([same["pressure_outward"], same["pressure_ahead"]], axis=1)
     if not ways:
@@ -124,11 +124,6 @@ def pressure_figure(found: Repetitions) -> str:
         x, y, marks, "Mean way of the centre of pressure on each sole.", frame=svg.Frame(width=270.0, height=150.0)
     )
     return f'<div class="cell">{drawn}</div>'
-
-
-def _of_most(group: CurveGroup) -> Array:
-    """Return the mean where at least half of the cycles are known: elsewhere it is of another few."""
-    return np.where(2 * np.isfinite(group.values).sum(axis=0) >= len(group.values), group.mean, np.nan)
 
 
 def consistency_figure(found: Repetitions) -> str:

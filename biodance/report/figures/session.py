@@ -16,7 +16,7 @@ from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures import vector as svg
 from biodance.report.figures.style import SIDE_COLOURS
-from biodance.report.wording import format_number, millimetres
+from biodance.report.wording import millimetres
 
 _LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
 """N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
@@ -151,11 +151,6 @@ def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None 
     return svg.CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
 
 
-def place_words(about: Array) -> str:
-    """Return a point of the lab in words: x and y in m."""
-    return f"x {format_number(about[0], 2)} m, y {format_number(about[1], 2)} m"
-
-
 FORCE_SCALE = 0.001
 """Length of the drawn force, m per N."""
 
@@ -166,15 +161,6 @@ VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 """Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""
 
 _MM = 1000.0
-
-
-def _screen(still: Still, elevation: float, azimuth: float) -> Array:
-    """Return the matrix (3, 3) that turns lab points into mm to the right, down and towards the eye."""
-    e, a = np.radians(elevation), np.radians(azimuth) + np.arctan2(still.forward[1], still.forward[0])
-    right = [-np.sin(a), np.cos(a), 0.0]
-    up = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
-    eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
-    return _MM * np.array([right, [-v for v in up], eye]).T
 
 
 def _rounded(box: Array) -> Array:
@@ -241,7 +227,11 @@ def still_figure(still: Still) -> str:
     """Return the body, its markers, the plates and the ground force from two sides as HTML, both to one scale."""
     drawn = []
     for elevation, azimuth, title in VIEWS:
-        screen = _screen(still, elevation, azimuth)
+        # the matrix that turns lab points into mm to the right, down and towards the eye
+        e, a = np.radians(elevation), np.radians(azimuth) + np.arctan2(still.forward[1], still.forward[0])
+        down = [np.sin(e) * np.cos(a), np.sin(e) * np.sin(a), -np.cos(e)]
+        eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+        screen = _MM * np.array([[-np.sin(a), np.cos(a), 0.0], down, eye]).T
         parts = [
             _line((corners[[0, 1, 2, 3, 0]] @ screen)[:, :2], f'stroke="{GREY}" stroke-width="6"')
             for corners in still.plates

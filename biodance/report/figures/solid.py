@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -59,35 +60,22 @@ def _body(plotter: Any, still: Still) -> None:
     plotter.add_mesh(pv.Sphere(0.03, still.com), color=GREEN)
 
 
-def _camera(
-    plotter: Any, still: Still, view: tuple[float, float], *, distance: float, height: float | None = None
-) -> None:
-    """Look at the middle of the body; ``height`` m: as if it were so high, so that feet stand on one line."""
+def _camera(plotter: Any, still: Still, height: float) -> None:
+    """Look at the middle of a body ``height`` m high, so that feet stand on one line, from the front, right, above."""
     points = still.bones.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = (low + high) / 2
-    middle[2] = low[2] + (high[2] - low[2] if height is None else height) / 2
-    heading = np.arctan2(still.forward[1], still.forward[0])
-    up, around = np.radians(view[0]), np.radians(view[1]) + heading
+    low = points.min(axis=0)
+    middle = (low + points.max(axis=0)) / 2
+    middle[2] = low[2] + height / 2
+    up, around = np.radians(12.0), np.radians(-50.0) + np.arctan2(still.forward[1], still.forward[0])
     away = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
-    plotter.camera_position = [middle + distance * away, middle, (0.0, 0.0, 1.0)]
+    plotter.camera_position = [middle + 5.8 * away, middle, (0.0, 0.0, 1.0)]
     plotter.camera.view_angle = 24.0
-
-
-def _png(plotter: Any) -> bytes:
-    from io import BytesIO
-
-    from PIL import Image
-
-    picture = BytesIO()
-    Image.fromarray(plotter.screenshot(return_img=True)).save(picture, "PNG", optimize=True)
-    plotter.close()
-    return picture.getvalue()
 
 
 def _draw_sheet(stills: Sequence[Still]) -> bytes:
     """Return the PNG of many postures, each from the front, right, with its title, all to one scale."""
     import pyvista as pv
+    from PIL import Image
 
     columns = min(_COLUMNS, len(stills))
     rows = -(-len(stills) // columns)
@@ -99,8 +87,11 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
         plotter.subplot(i // columns, i % columns)
         _body(plotter, still)
         plotter.add_text(still.trial, position="upper_left", font_size=8, color=BLACK)
-        _camera(plotter, still, (12.0, -50.0), distance=5.8, height=height)
-    return _png(plotter)
+        _camera(plotter, still, height)
+    picture = BytesIO()
+    Image.fromarray(plotter.screenshot(return_img=True)).save(picture, "PNG", optimize=True)
+    plotter.close()
+    return picture.getvalue()
 
 
 if __name__ == "__main__":

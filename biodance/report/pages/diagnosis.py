@@ -153,29 +153,15 @@ def how_sure(one: Finding) -> str:
 
 def diagnosis_section(found: SessionDiagnosis) -> str:
     """Return the section of the session's report on what the simulation gets wrong, as HTML text."""
-    from markupsafe import Markup
-
-    one = found.diagnosis
-    nothing = "No cause is named; the verdict stands at the top of this page."
-    start = "What was found, its size, and what to do:" if one.findings else nothing
-    failures = Markup("").join(
-        Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause)
-        for what, cause in found.failures.items()
-    )
-    rows = Markup("").join(
-        Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
-            cause_in_words(f.effect, f.target),
-            "; ".join(f"{spaced(p.name)} {estimated(p)}" for p in f.parameters),
-            f.advice,
+    rows = [
+        (
+            cause_in_words(one.effect, one.target),
+            "; ".join(f"{spaced(size.name)} {estimated(size)}" for size in one.parameters),
+            one.advice,
         )
-        for f in one.findings
-    )
-    table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
-    return Markup(
-        '<section id="wrong"><h2>What the simulation gets wrong</h2><p>{}</p>{}{}'
-        "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
-        "changes.</p></section>"
-    ).format(start, failures, table)
+        for one in found.diagnosis.findings
+    ]
+    return render("wrong.html.j2", failures=found.failures, rows=rows)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:

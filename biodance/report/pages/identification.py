@@ -1,6 +1,6 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -247,7 +247,7 @@ def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tu
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
 
 
-def _mass_changes(changes: Iterable[Difference]) -> list[Row]:
+def _mass_changes(changes: Sequence[Difference]) -> list[Row]:
     rows = tables.DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
     return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
 

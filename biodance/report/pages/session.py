@@ -19,13 +19,12 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import Provenance
 from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.pipeline.trial_result import Check, TrialResult
-from biodance.records import CHANNELS, AngleState
+from biodance.records import CHANNELS, AngleState, Array
 from biodance.records.attention import Attention
 from biodance.report.figures.session import (
     FORCE_SCALE,
     RESIDUAL_SCALE,
     marker_figure,
-    place_words,
     standing_figure,
     still_figure,
     validation_figure,
@@ -181,6 +180,10 @@ def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -
     return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
 
 
+def _place(about: Array) -> str:
+    return f"x {format_number(about[0], 2)} m, y {format_number(about[1], 2)} m"
+
+
 def _apart(value: float, above: str, below: str) -> str:
     """Return a signed distance in m as words: ``15.1 mm behind``."""
     return f"{millimetres(abs(value))} mm {above if value > 0 else below}"
@@ -239,7 +242,7 @@ def page(
     name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     whole = render(
         "page.html.j2",
-        filters={"place": place_words, "apart": _apart},
+        filters={"place": _place, "apart": _apart},
         schemas={"gap": GAP_ROW},
         scripts=[template_text("curves.js"), *((three_js(), template_text("replay.js")) if replay else ())],
         replay=Markup(replay_data(replay)) if replay else "",

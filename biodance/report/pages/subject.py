@@ -228,12 +228,6 @@ _WHY = {
 _ELSE = N_("One of our checks failed.")
 
 
-def plain_reasons(reasons: tuple[str, ...], words: Language) -> tuple[str, ...]:
-    """Return sentences for the subject, each once."""
-    said = [next((text for start, text in _WHY.items() if one.startswith(start)), _ELSE) for one in reasons]
-    return tuple(words.say(one) for one in dict.fromkeys(said))
-
-
 def kilograms(part: PartMass, words: Language) -> str:
     """Return the range of a part; "not measured well" where there is none."""
     return _between(part.low, part.high, words) if part.measured else words.say("not measured well")
@@ -247,6 +241,7 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
     whom = visit.operator or visit.lab or words.say("the lab")
     if visit.operator and visit.lab:
         whom = words.say("%(person)s at %(lab)s", person=visit.operator, lab=visit.lab)
+    why = [next((text for start, text in _WHY.items() if one.startswith(start)), _ELSE) for one in account.withheld]
     facts = ((N_("Lab"), visit.lab), (N_("Done by"), visit.operator), (N_("Date"), words.date(visit.date)))
     return render(
         "subject.html.j2",
@@ -262,7 +257,7 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
         small_picture=_picture(account, words, _PHONE),
         weight=_between(*account.weight, words) if np.isfinite(account.weight[0]) else "",
         together=(_name(account.together, words), kilograms(account.together, words)) if account.together else None,
-        reasons=plain_reasons(account.withheld, words),
+        reasons=tuple(words.say(one) for one in dict.fromkeys(why)),
     )
 
 

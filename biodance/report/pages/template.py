@@ -115,7 +115,10 @@ def render(
     from markupsafe import Markup
 
     style = template_text("page.css") + template_text("curves.css")
-    given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
+    hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    allowed = f"script-src {hashes}; " if scripts else ""
+    policy = f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:"
+    given = {"style": Markup(style), "policy": policy, "scripts": [Markup(text) for text in scripts]}
     return _compiled(template, tuple((filters or {}).items())).render(**{"version": __version__, **given, **values})
 
 
@@ -154,9 +157,3 @@ def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
 def _css_text(text: str) -> str:
     """Return text as a string of a style sheet; nothing in it can end the string or the sheet."""
     return '"' + "".join(c if c.isalnum() or c in " .,:-·" else f"\\{ord(c):x} " for c in text) + '"'
-
-
-def _policy(scripts: Sequence[str]) -> str:
-    hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts)
-    allowed = f"script-src {hashes}; " if scripts else ""
-    return f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:"

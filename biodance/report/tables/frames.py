@@ -36,20 +36,6 @@ _CYCLE = Schema("cycle=0 kind=1.kind cycle_side=1.side start_s=1.start end_s=1.e
 _FILE_ANGLE = Schema(f"{FILE_ANGLE_ROW.fields} frames")
 
 
-def movement_tables(moved: SessionMovement) -> dict[str, "DataFrame"]:
-    """Return ``events``, ``cycles``, ``strides`` (spatio-temporal values, unit in the column's name),
-    ``cycle_curves`` (every repetition by per cent), ``mean_curves`` and ``file_angles``.
-    """
-    return {
-        "events": _by_trial(EVENT_ROW, {one.trial: one.events for one in moved}),
-        "cycles": _by_trial(_CYCLE, {one.trial: enumerate(one.cycles, start=1) for one in moved}),
-        "strides": _strides(moved),
-        "cycle_curves": _joined(map(_curves, moved), ("trial",)),
-        "mean_curves": moved.table(),
-        "file_angles": _by_trial(_FILE_ANGLE, {one.trial: one.file_angles for one in moved}),
-    }
-
-
 def _by_trial(schema: Schema, records: Mapping[str, Iterable[Any]]) -> "DataFrame":
     """Return one table of the records of all trials, the trial in front."""
     rows = (row for trial, some in records.items() for row in schema.rows(some, trial=trial))
@@ -118,8 +104,9 @@ def session_tables(
     (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin; what plates are known
     to read is in neither); with an identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are
     known; empty where the posture is not determined) and ``validation``; with a diagnosis ``findings``,
-    ``unobservable`` and ``adequacy``; with a movement those of `movement_tables`. A table without rows has its columns
-    all the same.
+    ``unobservable`` and ``adequacy``; with a movement ``events``, ``cycles``, ``strides`` (spatio-temporal values, unit
+    in the column's name), ``cycle_curves`` (every repetition by per cent), ``mean_curves`` and ``file_angles``. A table
+    without rows has its columns all the same.
     """
     found = result.identification
     tables = {
@@ -140,7 +127,14 @@ def session_tables(
             "adequacy": _ADEQUACY.frame(diagnosis.adequacy),
         }
     if movement is not None:
-        tables |= movement_tables(movement)
+        tables |= {
+            "events": _by_trial(EVENT_ROW, {one.trial: one.events for one in movement}),
+            "cycles": _by_trial(_CYCLE, {one.trial: enumerate(one.cycles, start=1) for one in movement}),
+            "strides": _strides(movement),
+            "cycle_curves": _joined(map(_curves, movement), ("trial",)),
+            "mean_curves": movement.table(),
+            "file_angles": _by_trial(_FILE_ANGLE, {one.trial: one.file_angles for one in movement}),
+        }
     return tables
 
 

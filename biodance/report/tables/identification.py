@@ -1,6 +1,6 @@
 """What identification found. Channels in the order Fx Fy Fz Mx My Mz."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from biodance.report.tables.schema import Row, Schema
 
 TENSOR_ORDER = ("xx", "xy", "yy", "xz", "yz", "zz")
 ASKED = ("mass", "com x", "com y", "com z")
-"""Quantities whose shares from the data are averaged into a segment's ``information``."""
+"""Quantities whose shares from the data, 0 to 1, are averaged into a segment's ``information``."""
 AGREEMENT_ROW = Schema("rms cc=correlation frames")
 """RMS and correlation of six channels; null where a correlation is not defined."""
 VALIDATION_ROW = Schema(
@@ -50,11 +50,6 @@ def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
     return tuple(known for known in found.known if known.segment == name)
 
 
-def information_share(rows: Sequence[Known]) -> float:
-    """Return the share of a segment's mass and centre of mass that comes from the data, 0 to 1."""
-    return float(np.mean([row.from_data for row in rows if row.quantity in ASKED]))
-
-
 def _each(attribute: str, first: int, last: int) -> str:
     """Return the places of an attribute in some of a segment's ten quantities."""
     return ",".join(f"{k}.{attribute}" for k in range(first, last + 1))
@@ -67,7 +62,7 @@ SEGMENT_ROW = Schema(
     f"inertia_prior_kgm2={_each('table', 4, 9)}",
     {
         "mass_prior_source": lambda _: "table",
-        "information": information_share,
+        "information": lambda rows: float(np.mean([row.from_data for row in rows if row.quantity in ASKED])),
         "from_data": lambda rows: {row.quantity: row.from_data for row in rows},
         "verdict": lambda rows: {row.quantity: row.verdict for row in rows},
     },
@@ -127,18 +122,15 @@ def torques_document(bands: TorqueBands | None) -> Row | None:
     """
     if bands is None:
         return None
-    return {"trial": bands.trial, "joints": [_torque(bands, j) for j in range(len(bands.joints))]}
-
-
-def _torque(bands: TorqueBands, joint: int) -> Row:
-    torque, half, table, sd = (
-        column[bands.use, joint] for column in (bands.torque, bands.half_width, bands.table, bands.sd)
-    )
-    peak = int(np.argmax(np.abs(torque)))
-    interval = (torque[peak] - half[peak], torque[peak] + half[peak])
-    sizes = (np.sqrt(np.mean(sd**2)), np.sqrt(np.mean((torque - table) ** 2)))
-    values = (bands.joints[joint], bands.time[bands.use][peak], torque[peak], interval, table[peak], *sizes)
-    return dict(zip(TORQUE_ROW.places, values, strict=True))
+    joints, columns = list[Row](), (bands.torque, bands.half_width, bands.table, bands.sd)
+    for j, name in enumerate(bands.joints):
+        torque, half, table, sd = (column[bands.use, j] for column in columns)
+        peak = int(np.argmax(np.abs(torque)))
+        interval = (torque[peak] - half[peak], torque[peak] + half[peak])
+        sizes = (np.sqrt(np.mean(sd**2)), np.sqrt(np.mean((torque - table) ** 2)))
+        values = (name, bands.time[bands.use][peak], torque[peak], interval, table[peak], *sizes)
+        joints.append(dict(zip(TORQUE_ROW.places, values, strict=True)))
+    return {"trial": bands.trial, "joints": joints}
 
 
 VISIT_ROW = Schema(

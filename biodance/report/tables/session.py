@@ -31,6 +31,7 @@ _SPREAD = Schema("mean sd count")
 _LEFT_OUT = Schema(
     "trial=cycle.trial side=cycle.side start_s=cycle.start end_s=cycle.end quantity because=because.value"
 )
+_MEAN = Schema("quantity side unit count=#values mean sd")
 _KEY = Schema(
     "quantity key unit difference difference_ci95=ci95 symmetry_percent=symmetry",
     {
@@ -68,15 +69,11 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
             for side in ("both", *SIDES)
             for name, told in found.spatiotemporal(side).items()
         ],
-        "curves": [_curve_means(one) for one in found.groups],
-        "curves_beside": [_curve_means(one) for one in found.file_groups],
+        "curves": _MEAN.rows(found.groups),
+        "curves_beside": _MEAN.rows(found.file_groups),
         "key_values": _KEY.rows(found.keys),
         "scores": dict(zip(("ours", "beside"), map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
     }
-
-
-def _curve_means(one: CurveGroup) -> Row:
-    return Schema("quantity side unit count=#values mean sd").row(one)
 
 
 def _scores(one: GaitScores | None) -> Row | None:

@@ -124,19 +124,13 @@ def perform(
     curves = posing.choreograph(plan, time, rng, sloppiness=tolerances.performance)
     stance = posing.take_stance(person, plan.stance, centre, heading, rng)
     pose = posing.upper_body(person, curves, stance, tolerances, rng)
-    target = wanted_pressure(curves, stance) + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+    # the centre of pressure: between the feet by share of weight, plus lean
+    right, ahead = curves["shift"], np.array([np.cos(stance.heading), np.sin(stance.heading)])
+    middle = right * stance.pressure["right"] + (1 - right) * stance.pressure["left"]
+    leant = middle + curves["lean"][:, :1] * ahead + curves["lean"][:, 1:] * np.array([ahead[1], -ahead[0]])
+    target = leant + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
     nodes, error = keep_balance(person, pose, curves, stance, target)
     return Performance(plan, person, stance, curves, time, nodes, error)
-
-
-def wanted_pressure(curves: posing.Curves, stance: posing.FootStance) -> Array:
-    """Return where the centre of pressure should be (T, 2) m: between the feet by share of weight, plus lean."""
-    right = curves["shift"]
-    forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
-    ahead = np.array([np.cos(stance.heading), np.sin(stance.heading)])
-    rightwards = np.array([np.sin(stance.heading), -np.cos(stance.heading)])
-    middle = right * stance.pressure["right"] + (1 - right) * stance.pressure["left"]
-    return middle + forward * ahead + sideways * rightwards
 
 
 def keep_balance(
@@ -381,18 +375,14 @@ def _fields(shown: Shown) -> Array:
     angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), posing.WIDTH))
     for field, names in _JOINTS.items():
         out[:, posing.COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
-    out[:, posing.COLUMNS["pelvis"]] = pelvis_angles(Rotation.from_quat(q[:, 3:7]).as_matrix())
+    # forward tilt, right drop and left turn of the pelvis, facing lab x
+    turn = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    left, drop, back = Rotation.from_matrix(UPRIGHT.T @ turn).as_euler("YXZ").T
+    out[:, posing.COLUMNS["pelvis"]] = np.degrees(np.stack([-back, drop, left], axis=1))
     if not shown.seat:
         out[:, posing.COLUMNS["depth"]] = _depth(shown)[:, None]
     out[:, posing.RAISED :] = shown.raised
     return out
-
-
-def pelvis_angles(turn: Array) -> Array:
-    """Return forward tilt, right drop and left turn (T, 3) degrees of lab_R_pelvis (T, 3, 3), facing lab x."""
-    # Intrinsic: turn about up, drop about forward, then about right (backward positive).
-    left, drop, back = Rotation.from_matrix(UPRIGHT.T @ turn).as_euler("YXZ").T
-    return np.degrees(np.stack([-back, drop, left], axis=1))
 
 
 def _depth(shown: Shown) -> Array:

@@ -93,16 +93,6 @@ def _windows(
     return start, duration
 
 
-def _hidden_leg(previous: Array, target: Array) -> None:
-    """Let the angles of a raised foot stand still while they do not count: before it rises and after it lands."""
-    for side, foot in zip(SIDES, (RAISED, RAISED + 1), strict=True):
-        columns = COLUMNS[f"{side}_leg"]
-        if not previous[foot]:
-            previous[columns] = target[columns]
-        elif not target[foot]:
-            target[columns] = previous[columns]
-
-
 def choreograph(plan: TrialPlan, time: Array, rng: np.random.Generator, *, sloppiness: float) -> Curves:
     """Return the curves of one trial at ``time`` (T,) s; 0 is the start of the recording.
 
@@ -115,7 +105,13 @@ def choreograph(plan: TrialPlan, time: Array, rng: np.random.Generator, *, slopp
     for step in plan.steps:
         target = _target(step.to, rng, sloppiness)
         before = now.copy()
-        _hidden_leg(before, target)
+        for side, foot in zip(SIDES, (RAISED, RAISED + 1), strict=True):
+            # the angles of a raised foot stand still while they do not count: before it rises and after it lands
+            columns = COLUMNS[f"{side}_leg"]
+            if not before[foot]:
+                before[columns] = target[columns]
+            elif not target[foot]:
+                target[columns] = before[columns]
         values += np.where(time[:, None] >= start, before - now, 0.0)
         if step.cycles:
             depth = 1.0 + sloppiness * smooth_noise(rng, time, columns=1, cutoff=0.4)
@@ -213,7 +209,9 @@ def upper_body(
         shrug = t.girdle_motion * smooth_noise(girdle, time, columns=2, cutoff=0.6)
         add(f"{side}_clavicle_elevation", shrug[:, 0])
         add(f"{side}_clavicle_protraction", shrug[:, 1])
-    turn = _pelvis_turn(np.radians(curves["pelvis"]) + tremor[:, -3:], stance.heading)
+    # forward tilt, right drop and left turn
+    tilt, drop, left = (np.radians(curves["pelvis"]) + tremor[:, -3:]).T
+    turn = turn_about(Z, stance.heading + left) @ UPRIGHT @ turn_about(_X, drop) @ turn_about(-Z, tilt)
     upper = ~np.isin(np.arange(angle.shape[1]), [body.joint_index(f"{side}_{name}") for side in SIDES for name in LEG])
     angle[:, upper] += tremor[:, :-3][:, upper]
     q = np.zeros((time.size, body.nq))
@@ -227,12 +225,6 @@ _UNASKED = (
     *("neck_flexion", "neck_rotation", "thorax_flexion", "thorax_bending"),
     *(f"{side}_{name}" for side in SIDES for name in ("wrist_flexion", "wrist_deviation", "forearm_pronation")),
 )
-
-
-def _pelvis_turn(angle: Array, heading: float) -> Array:
-    """Return lab_R_pelvis (T, 3, 3) of forward tilt, right drop and left turn (T, 3) rad."""
-    tilt, drop, turn = angle.T
-    return turn_about(Z, heading + turn) @ UPRIGHT @ turn_about(_X, drop) @ turn_about(-Z, tilt)
 
 
 def turn_about(axis: Array, angle: Array) -> Array:

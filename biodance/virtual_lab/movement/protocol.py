@@ -222,7 +222,13 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     refuse_unknown(f"stance of trial {name!r} in {path}", stance, _STANCES)
     lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
     if "gait" in given:
-        return _gait(path, name, role, given)
+        refuse_unknown(f"gait of trial {name!r} in {path}", str(given["gait"]), GAITS)
+        seconds = _numbers(path, f"{name}.seconds", given.get("seconds", 10.0), 1)[0]
+        speed = _numbers(path, f"{name}.speed", given.get("speed", GAITS[given["gait"]].speed), 1)[0]
+        if not 2 <= seconds <= 600 or not 0.3 <= speed <= 5:
+            said = f"{seconds} s at {speed} m/s; legal are 2 to 600 s, 0.3 to 5 m/s."
+            raise BiodanceError(f"{path}: trial {name!r}: {said}")
+        return TrialPlan(name, role, "parallel", (), seconds / 2, str(given["gait"]), speed)
     steps = tuple(_step(path, name, step, postures) for step in given.get("steps", []))
     _check_feet(path, name, steps)
     if steps and (steps[-1].to.raised or not steps[-1].cycles) and steps[-1].to.name != "stand":
@@ -230,16 +236,6 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     if lead < 0 or (not steps and lead == 0):
         raise BiodanceError(f"{path}: trial {name!r} lasts no time; give steps or a lead in seconds.")
     return TrialPlan(name, role, stance, steps, lead)
-
-
-def _gait(path: Path, name: str, role: Role, given: dict[str, Any]) -> TrialPlan:
-    """Return a trial of walking or running: gait, seconds and speed m/s."""
-    refuse_unknown(f"gait of trial {name!r} in {path}", str(given["gait"]), GAITS)
-    seconds = _numbers(path, f"{name}.seconds", given.get("seconds", 10.0), 1)[0]
-    speed = _numbers(path, f"{name}.speed", given.get("speed", GAITS[given["gait"]].speed), 1)[0]
-    if not 2 <= seconds <= 600 or not 0.3 <= speed <= 5:
-        raise BiodanceError(f"{path}: trial {name!r}: {seconds} s at {speed} m/s; legal are 2 to 600 s, 0.3 to 5 m/s.")
-    return TrialPlan(name, role, "parallel", (), seconds / 2, str(given["gait"]), speed)
 
 
 def _check_feet(path: Path, trial: str, steps: tuple[ProtocolStep, ...]) -> None:

@@ -64,18 +64,6 @@ def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
     return move @ J @ move.T
 
 
-def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
-    """Return J after a random linear map of the body about its CoM and a random shift, relative to its own size."""
-    com = J[:3, 3] / J[3, 3]
-    # About the centre of mass, so that a map of the shape does not move it.
-    centred = place_inertia(J, np.eye(3), -com)
-    # Root mean square size along each axis.
-    size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
-    return place_inertia(
-        centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3)
-    )
-
-
 def draw_sip(
     size: skeleton.Proportions,
     subject: Subject,
@@ -107,7 +95,12 @@ def draw_sip(
             place[2] = -place[2]
         side = np.exp(tolerances.side_mass * rng.normal() if kind != segment else 0.0)
         inertia = true_pseudo_inertia(percent * factor[kind] * side, place[:3], place[3:])
-        bodies.append(_stretched(inertia, rng, tolerances.segment_shape, tolerances.com))
+        # a random linear map of the body about its CoM, and a random shift relative to its own size
+        com = inertia[:3, 3] / inertia[3, 3]
+        centred = place_inertia(inertia, np.eye(3), -com)
+        spread = np.sqrt(np.diag(centred)[:3] / inertia[3, 3])
+        shape = np.eye(3) + tolerances.segment_shape * rng.normal(size=(3, 3))
+        bodies.append(place_inertia(centred, shape, com + tolerances.com * spread * rng.normal(size=3)))
     total = sum(J[3, 3] for J in bodies)
     # Linear in J: masses add up to the declared one, shapes stay.
     phi = np.concatenate([parameters_of_inertia(J * subject.mass / total) for J in bodies])

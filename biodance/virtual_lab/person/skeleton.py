@@ -223,12 +223,14 @@ SKIN_PLANE = np.array([1.0, 1.0, 0.35])
 MarkerPlace = tuple[str, tuple[float, float, float]]
 
 
-def _paired(size: Proportions) -> dict[str, MarkerPlace]:
-    """Return the places (segment, (3,) m) of the markers that exist on both sides, for the right side."""
+def _places(size: Proportions) -> tuple[dict[str, MarkerPlace], dict[str, MarkerPlace]]:
+    """Return the places (segment, (3,) m) of the markers that exist on both sides, for the right side; and those on the
+    midline and of RBAK.
+    """
     s = size["stature"]
     shoulder = size["thorax"] - size["shoulder_drop"]
     r = MARKER_RADIUS
-    return {
+    paired: dict[str, MarkerPlace] = {
         "ASI": ("pelvis", (0.026 * s, 0.054 * s, size["asis"] / 2)),
         "PSI": ("pelvis", (-0.073 * s, 0.053 * s, 0.0294 * s)),
         "THI": ("thigh", (0.0, -0.66 * size["thigh"], 0.048 * s)),
@@ -247,13 +249,7 @@ def _paired(size: Proportions) -> dict[str, MarkerPlace]:
         "WRB": ("forearm", (-0.012 * s, -0.98 * size["forearm"], -0.021 * s)),
         "FIN": ("hand", (-0.016 * s, -0.95 * size["hand"], 0.004 * s)),
     }
-
-
-def _single(size: Proportions) -> dict[str, MarkerPlace]:
-    """Return the places of the markers on the midline and of RBAK."""
-    s = size["stature"]
-    shoulder = size["thorax"] - size["shoulder_drop"]
-    return {
+    return paired, {
         "C7": ("thorax", (-0.034 * s, shoulder + 0.046 * s, 0.0)),
         "T10": ("thorax", (-0.058 * s, shoulder - 0.106 * s, 0.0)),
         "CLAV": ("thorax", (0.041 * s, shoulder + 0.004 * s, 0.0)),
@@ -268,18 +264,17 @@ WAND_RISE = {"THI": 0.06, "TIB": 0.05, "UPA": 0.04, "FRM": 0.03}
 
 def ideal_places(size: Proportions) -> tuple[tuple[str, ...], tuple[int, ...], Array]:
     """Return the labels (39), their true segments (39) and their ideal places (39, 3) m in the segment frames."""
-    names: list[str] = []
-    segments: list[int] = []
-    places: list[Array] = []
+    names, segments, places = list[str](), list[int](), list[Array]()
+    paired, single = _places(size)
     for side, letter in (("right", "R"), ("left", "L")):
-        for stem, (kind, place) in _paired(size).items():
+        for stem, (kind, place) in paired.items():
             point = np.array(place)
             if stem in WAND_RISE:
                 point[1] += WAND_RISE[stem] * size[kind] * (1.0 if side == "right" else -1.0)
             names.append(letter + stem)
             segments.append(TRUE_SEGMENTS.index(kind if kind in TRUE_SEGMENTS else f"{side}_{kind}"))
             places.append(on_side(point, side))
-    for name, (kind, place) in _single(size).items():
+    for name, (kind, place) in single.items():
         names.append(name)
         segments.append(TRUE_SEGMENTS.index(kind))
         places.append(np.array(place))
