@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.linalg.blas import daxpy
 
 from biodance.inference.rows import Rows
 from biodance.records import Array
@@ -46,20 +47,20 @@ class VisibleColumns:
     @classmethod
     def of(cls, rows: Rows) -> "VisibleColumns":
         """Return the columns of ``rows`` in the directions that these show."""
-        parts, group = [], []
+        parts, turns, group = [], [], []
         for g in [*range(len(rows.groups)), -1]:
             here = np.flatnonzero(rows.group == g)
-            way = np.eye(here.size)
+            own, way = rows.X[:, here], np.eye(here.size)
             if g >= 0:
-                square, way = eigh(rows.X[:, here].T @ rows.X[:, here], check_finite=False)
+                square, way = eigh(own.T @ own, check_finite=False)
                 way = way[:, square > _UNSEEN]
             whole = np.zeros((rows.group.size, way.shape[1]))
             whole[here] = way
-            parts.append(whole)
+            turns.append(whole)
+            parts.append(own @ way)
             group += [g] * way.shape[1]
-        turn = np.concatenate(parts, axis=1)
-        X = rows.X @ turn
-        return cls(rows, X, np.array(group, dtype=int), turn, _within(rows, X, X))
+        X = np.concatenate(parts, axis=1)
+        return cls(rows, X, np.array(group, dtype=int), np.concatenate(turns, axis=1), _within(rows, X))
 
     def only(self, where: slice) -> NDArray[np.intp]:
         """Return the indices of the columns that hold coefficients ``where`` of `Rows.X` and no others."""
@@ -70,21 +71,28 @@ class VisibleColumns:
     @cached_property
     def plates(self) -> Array:
         """(K, K) products of the columns in all rows of the plates."""
-        return self.scaled(np.ones(len(self.inner)))
+        return np.asarray(self.inner[:-1].sum(axis=0))
 
     def scaled(self, weight: Array) -> Array:
-        """Return `plates` where each band and channel has its ``weight`` (Q,)."""
-        return np.tensordot(weight[: len(self.inner) - 1], self.inner[:-1], 1)
+        """Return `plates` where each band and channel has its ``weight`` (Q,), of most 1."""
+        found = self.plates.copy()
+        for q in np.flatnonzero(weight[: len(self.inner) - 1] != 1):
+            daxpy(self.inner[q].ravel(), found.ravel(), a=weight[q] - 1)  # into found
+        return found
 
     def within(self, Z: Array) -> Array:
         """Return (Q, K, k) the products of the columns with others ``Z`` (r, k) in each noise group."""
         return _within(self.rows, self.X, Z)
 
 
-def _within(rows: Rows, X: Array, Z: Array) -> Array:
-    """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k) in each noise group."""
+def _within(rows: Rows, X: Array, Z: Array | None = None) -> Array:
+    """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k), by default itself, in each noise group."""
     block = rows.block[: rows.simulated]
     order = np.argsort(block, kind="stable")
     ends = np.searchsorted(block[order], np.arange(rows.noises + 1))
-    X, Z = X[order], Z[order]
-    return np.array([X[a:b].T @ Z[a:b] for a, b in pairwise(ends)])
+    X = X[order]
+    Z = X if Z is None else Z[order]
+    found = np.empty((rows.noises, X.shape[1], Z.shape[1]))
+    for (a, b), one in zip(pairwise(ends), found, strict=True):
+        np.matmul(X[a:b].T, Z[a:b], out=one)
+    return found

@@ -124,10 +124,10 @@ class ScaledFit:
         own, known = np.diag(half), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
-            within = half[np.ix_(here, here)]
-            known[g] = 4 * np.sum(within**2) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
+            within = half.T[np.ix_(here, here)]
+            known[g] = 4 * np.vdot(within, within) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
         plates = self.products.plates[:-1, :-1]
-        both = 2 * self.size @ (half * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
+        both = 2 * self.size @ (half.T * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
         shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
         return Curvature(shares, known, float(both * np.exp(-2 * self.scales.noise)))
 
@@ -195,11 +195,10 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     whole += found.markers
     seen = found.observed[:, found.used]
     whole[np.ix_(found.used, found.used)] += (seen * at.weights[:, None]).T @ seen
-    A = whole[:K, :K]
-    A *= size[:, None]
+    A = size[:, None] * whole[:K, :K]
     A *= size
     A[np.diag_indices(K)] += 1.0
-    lower = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
+    lower = cholesky(A.T, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
     w = np.append(-size * u, 1.0)
     square, markers = float(w @ found.plates @ w), float(w @ found.markers @ w)
