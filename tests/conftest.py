@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from shared_markers import forward_once
 
 import biodance.pipeline.front  # noqa: F401
 from biodance.lab.session.read import read_session
@@ -24,6 +25,14 @@ def pytest_runtest_protocol() -> Generator[None, object, object]:
     """
     with one_thread():
         return (yield)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _errors_of_a_motion_are_found_once() -> Generator[None]:
+    """Let all tests of one process share what the errors of the kinematics do in the same motion of the same body."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("biodance.diagnosis.problem.forward", forward_once)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,15 @@
 """Sessions with the markers of an earlier one, as where only forces are wrong: what markers alone tell is found once.
 
 The engine itself takes it from there for a copy with other forces (``examine(..., earlier=...)``), and looks whether
-the markers are the same; exchanged labels are looked for in markers alone.
+the markers are the same; exchanged labels are looked for in markers alone; errors of the kinematics are those of the
+same body in the same motion.
 """
 
 import hashlib
+import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -14,13 +17,16 @@ import pytest
 from biodance.effects import labels_swapped
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
-from biodance.records import Markers, Session, Trial
+from biodance.records import Markers, Motion, Session, Trial
+from biodance.uncertainty import sources
+from biodance.uncertainty.response import ErrorSource
 
-KEPT = 4
-"""Sessions that are remembered, the last ones."""
+KEPT, ERRORS, SMALL = 4, 16, 1e7
+"""Sessions that are remembered, the last ones; and trials with the errors of their kinematics, of so many bytes."""
 _sessions: dict[str, SessionResult] = {}
 _exchanges: dict[str, Any] = {}
-_look = labels_swapped.exchanged_labels
+_errors: dict[str, sources.Errors] = {}
+_look, _forward = labels_swapped.exchanged_labels, sources.forward
 
 
 def digest(*things: object) -> str:
@@ -50,6 +56,21 @@ def exchanged_once(trial: Trial, static: Markers | None, known: Any = (), others
     if key not in _exchanges:
         _exchanges[key] = _look(trial, static, known, others)
     return _exchanges[key]
+
+
+def forward_once(kinds: tuple[ErrorSource, ...], motion: Motion) -> sources.Errors:
+    """Return what errors do in a motion: found once for the same kinds, body and motion, for nobody to write into."""
+    own = [(type(one), [getattr(one, part.name) for part in fields(one) if part.name != "body"]) for one in kinds]
+    body = [getattr(kinds[0].body, part.name) for part in fields(kinds[0].body)]
+    key = hashlib.sha256(pickle.dumps((own, body, motion.time, motion.q, motion.v, motion.a))).hexdigest()
+    found = _errors.pop(key, None) or _forward(kinds, motion)
+    found.wrench.setflags(write=False)
+    found.markers.setflags(write=False)
+    if found.wrench.nbytes < SMALL:
+        _errors[key] = found
+    while len(_errors) > ERRORS:
+        del _errors[next(iter(_errors))]
+    return found
 
 
 @contextmanager
