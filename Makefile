@@ -15,7 +15,7 @@ test: $(STAMP) bundle-if-possible
 
 PART ?= 1/1
 hidden: $(STAMP) # every cause hidden in sessions of two people and found again; by hand PART=all: of three, PART=2/7: a seventh
-	BIODANCE_HIDDEN=$(PART) $(BIN)/python -m pytest -n 2 tests/test_hidden_causes.py
+	BIODANCE_HIDDEN=$(PART) $(BIN)/python -m pytest -n 2 --dist worksteal tests/test_hidden_causes.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

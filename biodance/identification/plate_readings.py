@@ -18,7 +18,7 @@ from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.learning import START, WORTH
-from biodance.identification.mismatch import PlateRows, inverse_root, mismatch
+from biodance.identification.mismatch import PlateRows, inverse_root, mismatch, softness
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Array, Wrench
@@ -88,7 +88,8 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) 
         Mean and covariance of the errors beside each; the covariance counts how sure the identified parameters are.
     """
     used, about, _ = usable(found.body, fits)
-    rows, told = _rows(found, used, found.noise), []
+    softer = softness(found.body, used, found.noise.bands)
+    rows, told = _rows(found, used, found.noise, softer), []
     for body in bodies:
         first = _readings(found, rows, body)
         # What the plates read is taken off before the noise is learned again.
@@ -96,13 +97,15 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) 
         left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
         moments = left.moments(body.sip.phi, found.posterior.covariance)
         noise = replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH))
-        told.append(_readings(found, _rows(found, used, noise), body))
+        told.append(_readings(found, _rows(found, used, noise, softer), body))
     return tuple(told)
 
 
-def _rows(found: Identification, used: tuple[Fit, ...], noise: Noise) -> PlateRows:
-    """Return what the ``used`` trials tell of parameters and plates under a ``noise``, whatever the body."""
-    rows = mismatch(found.body, used, noise, with_rows=True).rows
+def _rows(found: Identification, used: tuple[Fit, ...], noise: Noise, softer: float) -> PlateRows:
+    """Return what the ``used`` trials tell of parameters and plates under a ``noise``, whatever the body; skin slides
+    ``softer`` times as much as the table says.
+    """
+    rows = mismatch(found.body, used, noise, softer=softer, with_rows=True).rows
     assert rows is not None
     return rows
 

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.linalg.blas import daxpy
 
 from biodance.inference.rows import Rows
 from biodance.records import Array
@@ -46,23 +47,21 @@ class VisibleColumns:
     @classmethod
     def of(cls, rows: Rows) -> "VisibleColumns":
         """Return the columns of ``rows`` in the directions that these show."""
-        parts, group = [], []
+        parts, turns, group = [], [], []
         for g in [*range(len(rows.groups)), -1]:
             here = np.flatnonzero(rows.group == g)
-            way = np.eye(here.size)
+            own, way = rows.X[:, here], np.eye(here.size)
             if g >= 0:
-                # Eigenvectors of X'X are the right singular vectors of X, its eigenvalues their
-                # squared singular values.
-                square, way = eigh(rows.X[:, here].T @ rows.X[:, here], check_finite=False)
+                # Eigenvectors of X'X are the right singular vectors of X, eigenvalues their squared singular values.
+                square, way = eigh(own.T @ own, check_finite=False)
                 way = way[:, square > _UNSEEN]
             whole = np.zeros((rows.group.size, way.shape[1]))
             whole[here] = way
-            # Back to all P coefficients: `turn` has orthonormal columns, so X turn u keeps u ~ N(0, lambda^2 1).
-            parts.append(whole)
+            turns.append(whole)
+            parts.append(own @ way)
             group += [g] * way.shape[1]
-        turn = np.concatenate(parts, axis=1)
-        X = rows.X @ turn
-        return cls(rows, X, np.array(group, dtype=int), turn, _within(rows, X, X))
+        X = np.concatenate(parts, axis=1)
+        return cls(rows, X, np.array(group, dtype=int), np.concatenate(turns, axis=1), _within(rows, X))
 
     def only(self, where: slice) -> NDArray[np.intp]:
         """Return the indices of the columns that hold coefficients ``where`` of `Rows.X` and no others."""
@@ -74,23 +73,30 @@ class VisibleColumns:
     @cached_property
     def plates(self) -> Array:
         """(K, K) products of the columns in all rows of the plates."""
-        return self.scaled(np.ones(len(self.inner)))
+        return np.asarray(self.inner[:-1].sum(axis=0))
 
     def scaled(self, weight: Array) -> Array:
-        """Return `plates` where each band and channel has its ``weight`` (Q,)."""
+        """Return `plates` where each band and channel has its ``weight`` (Q,), of most 1."""
         # X' W X = sum over q of w_q X_q' X_q: a weight that is common to a block needs no rows any more.
-        return np.tensordot(weight[: len(self.inner) - 1], self.inner[:-1], 1)
+        found = self.plates.copy()
+        for q in np.flatnonzero(weight[: len(self.inner) - 1] != 1):
+            daxpy(self.inner[q].ravel(), found.ravel(), a=weight[q] - 1)  # into found
+        return found
 
     def within(self, Z: Array) -> Array:
         """Return (Q, K, k) the products of the columns with others ``Z`` (r, k) in each noise group."""
         return _within(self.rows, self.X, Z)
 
 
-def _within(rows: Rows, X: Array, Z: Array) -> Array:
-    """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k) in each noise group."""
+def _within(rows: Rows, X: Array, Z: Array | None = None) -> Array:
+    """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k), by default itself, in each noise group."""
     block = rows.block[: rows.simulated]
     order = np.argsort(block, kind="stable")
     # Sorted by noise group, the rows of each lie between two ends: one matrix product per group.
     ends = np.searchsorted(block[order], np.arange(rows.noises + 1))
-    X, Z = X[order], Z[order]
-    return np.array([X[a:b].T @ Z[a:b] for a, b in pairwise(ends)])
+    X = X[order]
+    Z = X if Z is None else Z[order]
+    found = np.empty((rows.noises, X.shape[1], Z.shape[1]))
+    for (a, b), one in zip(pairwise(ends), found, strict=True):
+        np.matmul(X[a:b].T, Z[a:b], out=one)
+    return found

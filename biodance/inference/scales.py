@@ -125,12 +125,12 @@ class ScaledFit:
         own, known = np.diag(half), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
-            within = half[np.ix_(here, here)]
-            # 2 |1 - C|^2 (Frobenius) from the lower half: off-diagonals count twice, the diagonal as (1 - C_ii)^2.
-            known[g] = 4 * np.sum(within**2) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
+            within = half.T[np.ix_(here, here)]
+            # 2 |1 - C|^2 (Frobenius) from one half: off-diagonals count twice, the diagonal as (1 - C_ii)^2.
+            known[g] = 4 * np.vdot(within, within) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
         plates = self.products.plates[:-1, :-1]
-        # tr(L C L X'X) as a sum over products of entries; twice the lower half less the diagonal counted twice.
-        both = 2 * self.size @ (half * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
+        # tr(L C L X'X) as a sum over products of entries; twice one half less the diagonal counted twice.
+        both = 2 * self.size @ (half.T * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
         shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
         return Curvature(shares, known, float(both * np.exp(-2 * self.scales.noise)))
 
@@ -202,12 +202,11 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     seen = found.observed[:, found.used]
     # Only the columns that observations have: the sum of w_i x_i x_i' has zeros elsewhere.
     whole[np.ix_(found.used, found.used)] += (seen * at.weights[:, None]).T @ seen
-    # A = 1 + L X' S^-2 X L, in place: rows, then columns times their sizes.
-    A = whole[:K, :K]
-    A *= size[:, None]
+    # A = 1 + L X' S^-2 X L: rows, then columns times their sizes.
+    A = size[:, None] * whole[:K, :K]
     A *= size
     A[np.diag_indices(K)] += 1.0
-    lower = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
+    lower = cholesky(A.T, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
     # [X y] w = y - X L u: the residual's squares come from the products alone.
     w = np.append(-size * u, 1.0)

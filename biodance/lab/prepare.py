@@ -10,7 +10,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
@@ -87,7 +86,8 @@ def _design_low_pass(settings: LowPass, rate: float) -> Array:
             f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
             f"below {rate / 2:g} Hz."
         )
-    # Back through the bilinear transform to Hz.
+    from scipy.signal import butter
+
     designed = np.arctan(settings._raised(rate)) * rate / np.pi
     if settings.kind == "critically_damped":
         # The same first-order section, once for each order: no overshoot.
@@ -107,6 +107,8 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     BiodanceError
         The rate or the cut-off is not legal, or the whole signal is shorter than the shortest run.
     """
+    from scipy.signal import sosfiltfilt
+
     sections = _design_low_pass(settings, rate)
     values = np.asarray(values, dtype=float)
     need = settings.shortest(rate)

@@ -12,7 +12,7 @@ from biodance.body.human.skeleton import kind_of
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array, Index
 from biodance.spatial import skew
-from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares
+from biodance.uncertainty.response import ErrorSource, Response, in_segments, mean_squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +35,11 @@ class _Carried(ErrorSource):
 
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the markers that are carried along."""
-        return mean_local(trial, self._left(trial), np.ones((len(trial.place), 1)))
+        return np.asarray(in_segments(trial, trial.left(*self._moved(trial))).mean(axis=0))
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers that are carried along."""
-        return mean_squares(self._left(trial))
-
-    def _left(self, trial: Response) -> Array:
-        """Return what is left of all markers (F, 3M, K) m."""
-        found = [trial.left(moved, rows) for moved, rows in self._moved(trial)]
-        return np.concatenate(found or [np.empty((*trial.J.shape[:2], 0))], axis=2)
+        return mean_squares(trial.left(*self._moved(trial)))
 
 
 @dataclass(frozen=True, eq=False)

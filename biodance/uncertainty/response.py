@@ -91,25 +91,23 @@ class Response:
     @cached_property
     def follow(self) -> Array:
         """(F, nv, 3M): coordinates per marker displacement, least squares weighted by the body's marker weights."""
-        # dq = -(J'DJ)^-1 J'D x: the coordinates undo what the model's markers moved.
-        return np.asarray(-np.linalg.solve(*self._tracking))
+        root, half = self._tracking
+        return np.asarray(-np.swapaxes(root, 1, 2) @ half)
 
     @cached_property
     def answer(self) -> Array:
         """(F, 9, 3M): functionals per marker displacement, ``tangent @ follow`` without `follow`."""
-        normal, weighted = self._tracking
-        # Solved for the nine functionals instead of 3M markers; the normal matrix is symmetric.
-        return -np.swapaxes(np.linalg.solve(normal, np.swapaxes(self.tangent, 1, 2)), 1, 2) @ weighted
+        root, half = self._tracking
+        return np.asarray(-(self.tangent @ np.swapaxes(root, 1, 2)) @ half)
 
     @cached_property
     def _tracking(self) -> tuple[Array, Array]:
-        """Return the normal matrices (F, nv, nv) of the tracking, with a ridge, and J' D (F, nv, 3M)."""
-        # (J'D) (F, nv, 3M); every marker's weight holds for its three rows.
+        """Return L^-1 (F, nv, nv) of the tracking's normal matrices L L', with a ridge, and L^-1 J' D (F, nv, 3M)."""
         weighted = np.swapaxes(np.repeat(self.body.markers.weight, 3)[:, None] * self.J, 1, 2)
         normal, nv = weighted @ self.J, self.body.nv
-        # In proportion to the mean diagonal of J'DJ: the same share at any number and weight of markers.
         ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / nv
-        return normal + ridge * np.eye(nv), weighted
+        root = np.linalg.inv(np.linalg.cholesky(normal + ridge * np.eye(nv)))
+        return root, root @ weighted
 
     @cached_property
     def segments(self) -> SegmentMotion:
@@ -125,11 +123,16 @@ class Response:
         """Return the functionals (F, 9, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
         return np.asarray(self.answer[:, :, rows] @ moved)
 
-    def left(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
-        """Return what is left of all markers (F, 3M, K) m where model markers ``rows`` ``moved`` (F, R, K) m."""
-        # J dq + x: what the coordinates' answer does not undo.
-        left = self.J @ (self.follow[:, :, rows] @ moved)
-        left[:, rows] += moved
+    def left(self, *moves: tuple[Array, Index]) -> Array:
+        """Return what is left of all markers (F, 3M, K) m in turn where each of ``moves`` (F, R, k) m moved so many of
+        the model's markers, with their rows (R,) among 3M.
+        """
+        follow = [self.follow[:, :, rows] @ moved for moved, rows in moves]
+        left = self.J @ np.concatenate(follow or [np.empty((*self.follow.shape[:2], 0))], axis=2)
+        end = 0
+        for moved, rows in moves:
+            end += moved.shape[2]
+            left[:, rows, end - moved.shape[2] : end] += moved
         return np.asarray(left)
 
     def wrench(self, functional: Array) -> Array:
@@ -137,7 +140,6 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, _, size = functional.shape
         flat, value = functional.reshape(frames, -1), np.zeros((frames, 6 * size))
-        # F2 y: all six rows, twice differentiated; F1 y: moments alone, once.
         second.add(self.motion.rate**2, flat[:, : 6 * size], value)
         first.add(self.motion.rate, flat[:, 6 * size :], value[:, 3 * size :])
         wrench = value.reshape(frames, 6, size)
@@ -199,7 +201,6 @@ def derivatives(count: int) -> tuple[Banded, Banded]:
     """
     some = min(count, 2 * _REACH + 1)
     time = np.arange(some, dtype=float)
-    # A spline is linear in its samples: those of the unit vectors are the columns of the operator.
     spline = make_interp_spline(time, np.eye(some), k=min(5, some - 1))
     second, first = (Banded.of(_lengthened(spline.derivative(order)(time), count)) for order in (2, 1))
     return second, first
@@ -287,14 +288,13 @@ class ErrorSource(ABC):
         """Return (K,) mean square distance (m²) between markers and model that every error leaves."""
 
 
-def mean_local(trial: Response, residual: Array, weight: Array) -> Array:
-    """Return (M, 3, P * n): mean over time of residuals (F, 3M, P) in segment axes, times ``weight`` (F, n)."""
-    frames, worn = len(residual), list(trial.body.markers.segment)
-    local = np.swapaxes(trial.pose.rotation[:, worn], -1, -2) @ residual.reshape(frames, len(worn), 3, -1)
-    return np.asarray(local.reshape(frames, -1).T @ weight / frames).reshape(len(worn), 3, -1)
+def in_segments(trial: Response, residual: Array) -> Array:
+    """Return residuals (F, 3M, K) of the markers in the axes of their segments, (F, M, 3, K)."""
+    worn = list(trial.body.markers.segment)
+    back = np.swapaxes(trial.pose.rotation[:, worn], -1, -2)
+    return np.asarray(back @ residual.reshape(*back.shape[:3], -1))
 
 
 def mean_squares(left: Array) -> Array:
     """Return (K,) mean square distance of markers that are ``left`` (F, 3M, K) m from the model."""
-    # Mean over 3M coordinates times three: per marker a squared distance.
     return np.asarray(3 * np.mean(left**2, axis=(0, 1)))

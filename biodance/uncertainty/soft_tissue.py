@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from biodance.motion.ik.compiled.tree import FOUR, add_products
 from biodance.motion.kinematics import neighbours, poses
 from biodance.records import Array, Index
 from biodance.spatial import cross
-from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares
+from biodance.uncertainty.response import ErrorSource, Response, in_segments, mean_squares
 
 
 class _WithAngles(ErrorSource):
@@ -65,24 +66,28 @@ class Slide(_WithAngles):
 
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the patterns, times the angles."""
-        left = [mean_local(trial, part, self._angles(trial)[:, near]) for part, near in self._left(trial)]
-        return np.concatenate(left, axis=2)
+        left, cuts = self._left(trial)
+        local, angles = in_segments(trial, left), self._angles(trial)
+        mean = (local.reshape(len(left), -1).T @ angles / len(left)).reshape(*local.shape[1:], angles.shape[1])
+        parts = (mean[:, :, cut][..., near] for cut, (*_, near) in zip(cuts, self._parts, strict=True))
+        return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of every pattern, times the squared angles."""
         count = len(self.body.markers.names) * len(trial.place)
-        parts = ((np.einsum("frp,frp->fp", left, left), near) for left, near in self._left(trial))
+        left, cuts = self._left(trial)
+        square = np.einsum("frp,frp->fp", left, left)
+        parts = zip(cuts, self._parts, strict=True)
         # |left|² of a pattern times angle² summed over frames, over M F: mean squared distance.
         return np.concatenate(
-            [(square.T @ self._angles(trial)[:, near] ** 2 / count).ravel() for square, near in parts]
+            [(square[:, cut].T @ self._angles(trial)[:, near] ** 2 / count).ravel() for cut, (*_, near) in parts]
         )
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
             if self._alone[s]:
                 answer = trial.answer[:, :, rows].reshape(len(trial.answer), -1, 3)
-                # Each marker alone has the axes of its segment as patterns: displacements are
-                # -R, no (3m, 3m) is formed.
+                # Each marker alone has the axes of its segment as patterns: no (3m, 3m) displacements -R are formed.
                 yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 9, -1), near
             else:
                 yield trial.of_markers(self._moved(trial, s, on), rows), near
@@ -97,10 +102,11 @@ class Slide(_WithAngles):
         flat = (one.reshape(3 * len(one), -1 if one.size else 0) for one in self.patterns)
         return tuple(np.array_equal(one, np.eye(one.shape[1])) for one in flat)
 
-    def _left(self, trial: Response) -> Iterator[tuple[Array, Index]]:
-        """Yield for every segment what its patterns leave of the markers (F, 3M, P) m per radian, and the angles."""
-        for s, on, rows, near in self._parts:
-            yield trial.left(self._moved(trial, s, on), rows), near
+    def _left(self, trial: Response) -> tuple[Array, list[slice]]:
+        """Return what all patterns leave of the markers (F, 3M, K) m per radian, and where those of a segment are."""
+        moves = [(self._moved(trial, s, on), rows) for s, on, rows, _ in self._parts]
+        ends = np.cumsum([0, *(moved.shape[2] for moved, _ in moves)])
+        return trial.left(*moves), [slice(a, b) for a, b in pairwise(ends)]
 
     def _moved(self, trial: Response, s: int, on: Index) -> Array:
         """Return the displacements (F, 3m, P) of the model's markers against those measured, lab."""
@@ -137,8 +143,7 @@ class Sag(ErrorSource):
 
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the markers left behind."""
-        left = self._left(trial)
-        return mean_local(trial, left, np.ones((len(left), 1)))
+        return np.asarray(in_segments(trial, self._left(trial)).mean(axis=0))
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers left behind."""
@@ -146,7 +151,7 @@ class Sag(ErrorSource):
 
     def _left(self, trial: Response) -> Array:
         """Return what is left of the markers (F, 3M, K) m."""
-        return np.concatenate([trial.left(*self._moved(trial, s)) for s in self._worn], axis=2)
+        return trial.left(*(self._moved(trial, s) for s in self._worn))
 
     @property
     def _worn(self) -> tuple[int, ...]:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import false_discovery_control
-from scipy.stats import t as student
 
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
@@ -41,7 +39,8 @@ class VisitMean:
         """
         if self.count < FEWEST_STRIDES:
             return None
-        # Two-sided: 97.5 % quantile of Student's t.
+        from scipy.stats import t as student  # takes most of a second to import
+
         half = float(student.ppf((1 + _COVERAGE) / 2, self.freedom)) * self.error
         return self.mean - half, self.mean + half
 
@@ -73,6 +72,8 @@ def change_of_mean(earlier: VisitMean, later: VisitMean) -> MeanChange:
     Welch and Satterthwaite, V^2 / sum(error^4 / freedom): what strides share has no freedom of its own, its size is
     taken as known.
     """
+    from scipy.stats import t as student
+
     value = later.mean - earlier.mean
     if min(earlier.count, later.count) < FEWEST_STRIDES:
         return MeanChange(value, None, None)
@@ -95,6 +96,8 @@ def beyond_chance(p: Sequence[float | None]) -> NDArray[np.bool_]:
     tested = np.array([one is not None for one in p], dtype=bool)
     told = np.zeros(tested.size, dtype=bool)
     if tested.any():
+        from scipy.stats import false_discovery_control
+
         known = np.array([one for one in p if one is not None])
         told[tested] = false_discovery_control(known) <= FALSE_DISCOVERIES
     return told

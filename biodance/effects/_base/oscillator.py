@@ -7,7 +7,6 @@ only sets the place of rest. The ground then carries m (a + x'') instead of m a,
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects._base.case import Case
 from biodance.records import Array
@@ -21,6 +20,8 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving
     point.
     """
+    from scipy.signal import lfilter
+
     w, (numerators, denominator, rest) = 2 * np.pi * frequency, _filters(rate, frequency, damping)
     place, speed = (
         # Initial state of a filter at rest under the first acceleration.
@@ -36,6 +37,8 @@ def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Arra
     """Return numerators (2, 3), of place and speed, their denominator (3,), and the states in which both are at rest
     under a constant acceleration of 1: the free mass, sampled.
     """
+    from scipy.signal import cont2discrete, lfilter_zi, ss2tf
+
     w = 2 * np.pi * frequency
     system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
     # First-order hold: exact for inputs that are linear between samples.

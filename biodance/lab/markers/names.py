@@ -87,11 +87,12 @@ def readings(label: str, pairs: Iterable[tuple[str, str]], noise: frozenset[str]
     """Return the ways to take a side from one label, with ``pairs`` (right, left); ``noise`` says nothing."""
     tokens = _tokens_of(label)
     kept = tuple(token for token in tokens if token not in noise) or tokens
-    out = [_Spelled("", given) for given in dict.fromkeys((kept, tokens))]
+    whole = {given: "".join(given) for given in (kept, tokens)}
+    out = [_Spelled("", given) for given in whole]
     for right, left in pairs:
         for word, side in ((right, "right"), (left, "left")):
-            for given in dict.fromkeys((kept, tokens)):
-                out += _sided(given, word, side, (right, left))
+            for given, text in whole.items():
+                out += _sided(given, word, side, (right, left)) if word in text else ()
     return [one for one in dict.fromkeys(out) if any(one.rest)]
 
 
