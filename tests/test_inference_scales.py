@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from scipy.stats import t as student
 
 from biodance.inference.columns import VisibleColumns
+from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.scales import (
     FLESH,
     FLOOR,
@@ -190,3 +191,24 @@ def test_one_outlier_among_observations_moves_nothing_and_stays_one() -> None:
     assert one.scales.weights[:-1].min() > 1.0
     normal = 3.0 * (X[:, 2] @ value) / (1 + X[:, 2] @ X[:, 2])
     assert normal > 5.0, "which least squares would say"
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.7])
+def test_of_columns_that_do_the_same_the_rows_show_the_sum_alone(scale: float) -> None:
+    """Each keeps half of its variance, and a bit; of a Gaussian with these rows in full the same."""
+    drawn = rows(np.random.default_rng(5), observations=0)
+    alike = np.array(drawn.X)
+    here = np.flatnonzero(drawn.group == 0)[:2]
+    alike[:, here[1]] = alike[:, here[0]]
+    drawn = replace(drawn, X=alike)
+    scales = Scales(np.array([scale, 0.2, -0.1]), 0.3, np.zeros(0))
+    columns = VisibleColumns.of(drawn)
+    found = posterior(bare(columns), prior_sd(drawn), scales)
+    one = Hypothesis((), columns, found, 0.0, np.zeros((len(drawn.y), 0)), drawn.y, sure(drawn))
+    sizes = np.where(drawn.group < 0, 1.0, np.exp(scales.groups[drawn.group]))
+    whole = covariance(drawn, scales)
+    shown = (alike * sizes**2).T
+    exact = np.diag(sizes**2) - shown @ np.linalg.solve(whole, shown.T)
+    for unit in (np.array([1.0, 0.0]), np.array([2.0, 1.0]), np.array([1.0, 1.0])):
+        got = one.variance(slice(int(here[0]), int(here[0]) + 2), unit)
+        assert got == pytest.approx(float(unit @ exact[np.ix_(here, here)] @ unit), rel=2e-3)
