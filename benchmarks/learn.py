@@ -1,7 +1,6 @@
 """Learn what is shipped: sizes of what is usual, and the noise of dances that people performed.
 
     python -m benchmarks learn tolerances [--rounds 10]         # sizes.csv (learned rows) and null_sessions.toml
-    python -m benchmarks learn tolerances --only sag            # all of them learned, and only what sags written
     python -m benchmarks learn dances FOLDER [--dance short]    # dances.toml
 
 Both are of anthropometry/uncertainty and written anew. Tolerances are learned from thirty sessions without fault of
@@ -16,7 +15,7 @@ import csv
 import hashlib
 import re
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,7 +33,7 @@ from biodance.pipeline.identification import FITTED_ROLES
 from biodance.pipeline.judged_trials import windows
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Subject
-from biodance.uncertainty.tolerances import Tolerances, read_tolerances, shipped, to_toml
+from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 from biodance.virtual_lab.movement.performance import PERFORMERS
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
@@ -75,15 +74,13 @@ def nulls() -> Iterator[Null]:
         print(f"person {person}, visit {visit}", flush=True)
 
 
-def write_sizes(found: Tolerances, only: Collection[str]) -> None:
-    """Write the learned sizes into their rows of the one table, of ``only`` these quantities unless there are none, and
-    its sha256 beside it.
-    """
+def write_sizes(found: Tolerances) -> None:
+    """Write the learned sizes into their rows of the one table, and its sha256 beside it."""
     table = TABLES / "sizes.csv"
     with open(table, newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     for row in rows:
-        if row["learned_on"] == "null_sessions" and (not only or row["quantity"] in only):
+        if row["learned_on"] == "null_sessions":
             row["sd"] = f"{found.size(' '.join((row['quantity'], row['target'])).removesuffix(' session')):.4g}"
     with open(table, "w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
@@ -96,18 +93,13 @@ def write_sizes(found: Tolerances, only: Collection[str]) -> None:
     )
 
 
-def tolerances(rounds: int, only: Collection[str]) -> None:
-    """Learn the tolerances and write them, of ``only`` these quantities unless there are none."""
-    sessions, table = tuple(nulls()), TABLES / "null_sessions.toml"
+def tolerances(rounds: int) -> None:
+    """Learn the tolerances and write them."""
+    sessions = tuple(nulls())
     found = learn_tolerances(sessions, shipped(), rounds=rounds)
     origin = f"{len(sessions)} virtual sessions of 20 persons without fault, realistic tolerances, protocol diagnosis"
-    write_sizes(found, only)
-    kept = replace(found, origin=origin, sizes={})
-    if only:
-        before = read_tolerances(table.read_text(encoding="utf-8"))
-        fresh = {key: mean for key, mean in found.means.items() if key.split()[0] in only}
-        kept = replace(before, means={**before.means, **fresh})
-    table.write_text(to_toml(kept), encoding="utf-8")
+    write_sizes(found)
+    (TABLES / "null_sessions.toml").write_text(to_toml(replace(found, origin=origin, sizes={})), encoding="utf-8")
 
 
 def left(place: Path) -> tuple[Array, Array]:
@@ -144,10 +136,9 @@ def main() -> None:
     ask.add_argument("what", choices=("tolerances", "dances"))
     ask.add_argument("folder", type=Path, nargs="?", help="of dances")
     ask.add_argument("--rounds", type=int, default=10)
-    ask.add_argument("--only", nargs="+", default=[], help="quantities of sizes.csv that are written")
     ask.add_argument("--dance", default="short")
     asked = ask.parse_args()
     if asked.what == "dances" and asked.folder is None:
         ask.error("dances need the FOLDER in which `python -m benchmarks dance` kept them.")
-    tolerances(asked.rounds, asked.only) if asked.what == "tolerances" else dances(asked.folder, asked.dance)
+    tolerances(asked.rounds) if asked.what == "tolerances" else dances(asked.folder, asked.dance)
     print(f"wrote {TABLES}")

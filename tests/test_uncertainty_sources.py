@@ -12,7 +12,6 @@ from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from biodance.body.body import Body
 from biodance.body.changes import recentre_joint
 from biodance.body.parts import GRAVITY, rigid_inertia
 from biodance.motion.dynamics import predict_wrench
@@ -114,22 +113,12 @@ def brute(moved: Array, places: Array, turns: Array) -> tuple[Array, Array]:
     return (after - before) / SMALL, local[..., 0].mean(axis=0) / SMALL
 
 
-@cache
-def marked() -> Body:
-    """Return the body whose markers were placed while it leant forward, its knees, hips and arms bent."""
-    stand = np.array(body().neutral)
-    stand[3:7] = (Rotation.from_rotvec([0.1, 0.4, 0.0]) * Rotation.from_quat(stand[3:7])).as_quat()
-    stand[7:] = 0.3 * np.sin(np.arange(len(body().joints)))
-    return replace(body(), marked_in=stand)
-
-
 def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
     """Return a source, the index of one of its errors, and what that error displaces at unchanged coordinates, by
     construction.
     """
-    one = marked()
+    one = body()
     true, worn = poses(one, moving().q), np.array(one.markers.segment)
-    since = moving().q - one.marked_in
     marker, com = (
         true.points(list(worn), one.markers.position),
         true.points(list(range(len(one.segments))), one.sip.com),
@@ -140,14 +129,13 @@ def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
         source = (of_clusters if kind == "slide" else of_markers)(one)[0]
         first, beside = source.groups.index("slide thigh"), np.flatnonzero(neighbours(one)[:, s])
         on = np.flatnonzero(worn == s)[: None if kind == "slide" else 1]
-        moved[:, on] = -(since[:, 7 + beside[1], None] * true.rotation[:, s, :, 0])[:, None]
+        moved[:, on] = -(moving().q[:, 7 + beside[1], None] * true.rotation[:, s, :, 0])[:, None]
         return source, first + 1, moved, places, turns
     if kind == "sag":
         source, s = Sag(one), one.segment_index("left_shank")
         on = worn == s
-        hung = true.rotation[:, s] @ (poses(one, one.marked_in[None]).rotation[0, s].T @ GRAVITY)
         time, middle = moving().time, marker[:, on].mean(axis=1)
-        moved[:, on] = (make_interp_spline(time, middle, k=5).derivative(2)(time) - GRAVITY + hung)[:, None]
+        moved[:, on] = (make_interp_spline(time, middle, k=5).derivative(2)(time) - GRAVITY)[:, None]
         return source, sorted(set(worn)).index(s), moved, places, turns
     if kind == "flesh":
         source, s = Flesh(one), one.segment_index("right_shank")
@@ -173,16 +161,6 @@ def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
     moved = (there.points(list(worn), away.markers.position) - marker) / SMALL
     places = (there.points(list(range(len(one.segments))), away.sip.com) - com) / SMALL
     return source, source.joints.index(name) + 1, moved, places, turns
-
-
-@pytest.mark.parametrize("source", [of_clusters(marked())[0], Sag(marked())])
-def test_standing_as_the_markers_were_placed_shows_no_soft_tissue(source: ErrorSource) -> None:
-    still = np.tile(marked().marked_in, (40, 1))
-    nothing = np.zeros((40, marked().nv))
-    found = forward((source,), Motion(moving().time[:40], still, nothing, nothing))
-    assert len(found.groups) >= 12
-    assert np.abs(found.markers).max() < 1e-9
-    assert np.abs(found.wrench).max() < 1e-6
 
 
 def slow(wrench: Array) -> Array:

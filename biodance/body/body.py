@@ -133,8 +133,6 @@ class Body(JointTree, Sendable):
         outline", "scan".
     parts : tuple
         Pieces of segments that move on joints of their own (``Part``): the head, hands, collar bones.
-    marked_in : array_like, optional
-        (nq,) posture in which the places of the markers were read, the static trial's; None: the neutral one.
 
     Examples
     --------
@@ -158,13 +156,10 @@ class Body(JointTree, Sendable):
     at_joint: Sip | None = None
     girths: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
-    marked_in: Array | None = None
 
     def __post_init__(self) -> None:
         count = len(self.segments)
         freeze(self, self.name, boxes=(count, 2, 3), gravity=(3,), com_boxes=(count, 2, 3))
-        if self.marked_in is not None:
-            freeze(self, self.name, marked_in=(self.nq,))
         if self.sip.segments != self.segments:
             raise BiodanceError(
                 f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments})."
@@ -262,11 +257,6 @@ class Body(JointTree, Sendable):
             q[3:7] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2.0)
         return q
 
-    @property
-    def marked_posture(self) -> Array:
-        """(nq,) in which the places of its markers were read."""
-        return self.neutral if self.marked_in is None else self.marked_in
-
     @cached_property
     def model(self) -> "pin.Model":
         """Its pinocchio model; never written to. Joint ids are 2 + index in `joints` (1 + index for a fixed root)."""
@@ -347,7 +337,6 @@ def _body(raw: dict[str, Any]) -> Body:
         at_joint=Sip(**raw["at_joint"]) if raw.get("at_joint") else None,
         girths={segment: tuple(names) for segment, names in raw.get("girths", {}).items()},
         parts=tuple(Part(**part) for part in raw.get("parts", ())),
-        marked_in=raw.get("marked_in"),
     )
 
 

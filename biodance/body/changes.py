@@ -284,11 +284,8 @@ def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
         key: np.insert(getattr(body.limits, key), first, np.full(count, value, dtype=float))
         for key, value in wide.items()
     }
-    joints, stand = (*shifted[:first], *added, *shifted[first:]), body.marked_in
-    if stand is not None:
-        stand = np.insert(stand, body.nq - len(body.joints) + first, np.zeros(count))
-    jointed = replace(body, joints=joints, limits=JointLimits(**limits), marked_in=stand)
-    return replace(jointed, markers=_markers(body, cut, new))
+    joints = (*shifted[:first], *added, *shifted[first:])
+    return replace(body, joints=joints, limits=JointLimits(**limits), markers=_markers(body, cut, new))
 
 
 def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:

@@ -11,7 +11,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
 from biodance.motion.ik.compiled.tree import FOUR, add_products
-from biodance.motion.kinematics import neighbours, poses
+from biodance.motion.kinematics import neighbours
 from biodance.records import Array, Index
 from biodance.spatial import cross
 from biodance.uncertainty.response import ErrorSource, Response, in_segments, mean_squares
@@ -24,14 +24,10 @@ class _WithAngles(ErrorSource):
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         """Yield for every segment functionals (F, 9, P) per radian, and the angles that they go with."""
 
-    @abstractmethod
-    def _angles(self, trial: Response) -> Array:
-        """Return the angles (F, n) rad of all joints, zero in the posture in which there is no error."""
-
     def functional(self, trial: Response) -> Array:
         """Return the functionals, times the angles."""
         # Slope (F, 9, P) times angle (F, n) as (F, 9, P, n), the angles last.
-        parts = [value[..., None] * self._angles(trial)[:, None, None, near] for value, near in self._slopes(trial)]
+        parts = [value[..., None] * trial.angles[:, None, None, near] for value, near in self._slopes(trial)]
         return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
 
     def transpose(self, trial: Response, back: Array) -> Array:
@@ -40,15 +36,14 @@ class _WithAngles(ErrorSource):
         work, back = np.empty((FOUR, size)), np.ascontiguousarray(back)
         for value, near in self._slopes(trial):
             sums = np.zeros((value.shape[2], near.size, size))
-            add_products(np.ascontiguousarray(value), self._angles(trial).take(near, axis=1), back, work, sums)
+            add_products(np.ascontiguousarray(value), trial.angles.take(near, axis=1), back, work, sums)
             found.append(sums.reshape(-1, size))
         return np.concatenate(found)
 
 
 @dataclass(frozen=True, eq=False)
 class Slide(_WithAngles):
-    """Skin over bone: a pattern of a segment's markers in proportion to the angle that a joint beside it has turned by
-    since they were placed (m/rad).
+    """Skin over bone: a pattern of a segment's markers in proportion to the angle of a joint beside it (m/rad).
 
     ``patterns`` per segment (m, 3, P) displacements of its m markers, segment axes: the markers of a segment as a
     whole, or each alone.
@@ -67,7 +62,7 @@ class Slide(_WithAngles):
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the patterns, times the angles."""
         left, cuts = self._left(trial)
-        local, angles = in_segments(trial, left), self._angles(trial)
+        local, angles = in_segments(trial, left), trial.angles
         mean = (local.reshape(len(left), -1).T @ angles / len(left)).reshape(*local.shape[1:], angles.shape[1])
         parts = (mean[:, :, cut][..., near] for cut, (*_, near) in zip(cuts, self._parts, strict=True))
         return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
@@ -80,7 +75,7 @@ class Slide(_WithAngles):
         parts = zip(cuts, self._parts, strict=True)
         # |left|² of a pattern times angle² summed over frames, over M F: mean squared distance.
         return np.concatenate(
-            [(square[:, cut].T @ self._angles(trial)[:, near] ** 2 / count).ravel() for cut, (*_, near) in parts]
+            [(square[:, cut].T @ trial.angles[:, near] ** 2 / count).ravel() for cut, (*_, near) in parts]
         )
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
@@ -91,10 +86,6 @@ class Slide(_WithAngles):
                 yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 9, -1), near
             else:
                 yield trial.of_markers(self._moved(trial, s, on), rows), near
-
-    def _angles(self, trial: Response) -> Array:
-        placed = self.body.marked_posture  # what skin did there is in the places of the markers
-        return trial.angles - placed[self.body.nq - len(self.body.joints) :]
 
     @cached_property
     def _alone(self) -> tuple[bool, ...]:
@@ -128,9 +119,7 @@ class Slide(_WithAngles):
 
 @dataclass(frozen=True, eq=False)
 class Sag(ErrorSource):
-    """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²), against
-    where it hung in the posture in which they were placed.
-    """
+    """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
@@ -157,14 +146,9 @@ class Sag(ErrorSource):
     def _worn(self) -> tuple[int, ...]:
         return tuple(sorted(set(self.body.markers.segment)))
 
-    @cached_property
-    def _placed(self) -> Array:
-        """(N, 3, 3) lab_R_segment where the markers were placed."""
-        return poses(self.body, self.body.marked_posture[None]).rotation[0]
-
     def _moved(self, trial: Response, s: int) -> tuple[Array, Index]:
-        """Return the acceleration (F, R, 1) less gravity, lab, of the middle of a segment's markers, less the same
-        carried along from where they were placed, for each of their rows (R,) among 3M.
+        """Return the acceleration (F, R, 1) less gravity, lab, of the middle of a segment's markers, for each of their
+        rows (R,) among 3M.
         """
         on = np.flatnonzero(np.array(self.body.markers.segment) == s)
         move = trial.segments
@@ -172,17 +156,15 @@ class Sag(ErrorSource):
         arm = move.rotation[:, s] @ self.body.markers.position[on].mean(axis=0)
         w = move.angular_velocity[:, s]
         acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
-        # a - g, less the same at rest where the marker was placed, carried along by the segment: that is in its place.
-        # Where the segment stands as it did there, nothing is left.
-        carried = move.rotation[:, s] @ (self._placed[s].T @ -self.body.gravity)
-        left_behind = np.tile(acceleration - self.body.gravity - carried, (1, on.size))[:, :, None]
+        # a - g: at rest +9.81 upwards, so the measured marker hangs below the model's by s times that.
+        left_behind = np.tile(acceleration - self.body.gravity, (1, on.size))[:, :, None]
         return left_behind, (3 * on[:, None] + np.arange(3)).ravel()
 
 
 @dataclass(frozen=True, eq=False)
 class Flesh(_WithAngles):
     """Matter that moves against its segment in proportion to an angle beside it, along the three axes of the segment
-    (m/rad); where all angles are zero it lies as the table says.
+    (m/rad).
     """
 
     @cached_property
@@ -199,9 +181,6 @@ class Flesh(_WithAngles):
         for s, near in enumerate(self._beside):
             # Functionals of a displacement (lab) times R: per metre along the segment's axes.
             yield trial.place[:, s] @ trial.pose.rotation[:, s], near
-
-    def _angles(self, trial: Response) -> Array:
-        return trial.angles
 
     @cached_property
     def _beside(self) -> tuple[Index, ...]:

@@ -214,8 +214,7 @@ class Scaling:
         q = _static_posture(body, frames)
         limits, widened = widen_limits(body, q)
         body = replace(body, limits=limits, notes=(*body.notes, *widened))
-        held = _widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q)
-        return replace(held, marked_in=q), q
+        return _widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 
 def measure_static(subject: Subject, static: Trial) -> Scaling:
