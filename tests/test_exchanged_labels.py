@@ -234,16 +234,15 @@ def test_an_exchange_for_half_a_second_is_found_to_the_frame_and_put_right(pairs
 
 def test_an_exchange_of_some_frames_is_put_right_in_a_copy_and_nothing_else(data: Path, tmp_path: Path) -> None:
     source = data / "biomechzoo/HC032A/HC032A03.c3d"
-    knees, absent = ({pair: [(70, 120)]} for pair in (("LKNE", "RKNE"), ("LXXX", "RKNE")))
-    wrong = write_exchanged(source, tmp_path / "wrong.c3d", knees)
+    wrong = write_exchanged(source, tmp_path / "wrong.c3d", {("LKNE", "RKNE"): [(70, 120)]})
     before, after = read_raw(source), read_raw(wrong)
     left, right = (before.labels.index(label) for label in ("LKNE", "RKNE"))
     np.testing.assert_array_equal(after.points[70:120, left], before.points[70:120, right])
     np.testing.assert_array_equal(after.points[:70, left], before.points[:70, left])
-    again = write_exchanged(wrong, tmp_path / "right.c3d", knees)
+    again = write_exchanged(wrong, tmp_path / "right.c3d", {("LKNE", "RKNE"): [(70, 120)]})
     assert again.read_bytes() == source.read_bytes()
     with pytest.raises(FileRefused, match="holds no point LXXX"):
-        write_exchanged(source, tmp_path / "none.c3d", absent)
+        write_exchanged(source, tmp_path / "none.c3d", {("LXXX", "RKNE"): [(0, 5)]})
 
 
 @pytest.mark.parametrize("child", ["HC002D", "HC036A"])

@@ -11,7 +11,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.linalg.blas import daxpy
 
 from biodance.inference.rows import Rows
 from biodance.records import Array
@@ -76,11 +75,11 @@ class VisibleColumns:
         return np.asarray(self.inner[:-1].sum(axis=0))
 
     def scaled(self, weight: Array) -> Array:
-        """Return `plates` where each band and channel has its ``weight`` (Q,), of most 1."""
+        """Return `plates` where each band and channel has its ``weight`` (Q,); those of weight 1 cost nothing."""
         # X' W X = sum over q of w_q X_q' X_q: a weight that is common to a block needs no rows any more.
         found = self.plates.copy()
         for q in np.flatnonzero(weight[: len(self.inner) - 1] != 1):
-            daxpy(self.inner[q].ravel(), found.ravel(), a=weight[q] - 1)  # into found
+            found += (weight[q] - 1) * self.inner[q]
         return found
 
     def within(self, Z: Array) -> Array:

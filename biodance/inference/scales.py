@@ -125,7 +125,7 @@ class ScaledFit:
         own, known = np.diag(half), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
-            within = half.T[np.ix_(here, here)]
+            within = half.T[np.ix_(here, here)]  # transposed: rows lie together in memory
             # 2 |1 - C|^2 (Frobenius) from one half: off-diagonals count twice, the diagonal as (1 - C_ii)^2.
             known[g] = 4 * np.vdot(within, within) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
         plates = self.products.plates[:-1, :-1]
@@ -206,6 +206,7 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     A = size[:, None] * whole[:K, :K]
     A *= size
     A[np.diag_indices(K)] += 1.0
+    # A is symmetric: its transpose is the same matrix in LAPACK's order, so that nothing is copied.
     lower = cholesky(A.T, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
     # [X y] w = y - X L u: the residual's squares come from the products alone.
