@@ -36,11 +36,8 @@ _TOO_FAR = 4.0
 """So many times as far from the body, markers are no longer those of the segments that they are named after: nothing is
 named. (Soft tissue made 2 to 3 times as large in an independent laboratory: 1.6 to 2.6.)
 """
-_SOFT = (
-    *("flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced "),
-    *("wobbling_mass ", "shown "),
-)
-"""Keys of the tolerances that grow with it."""
+_SOFT = ("flesh ", "sag ", "slide ", "marker ", "wobbling_mass ", "shown ")
+"""Keys of the tolerances that grow with it: bones and where markers are stuck do not."""
 SWAYING = 0.3
 """Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
 UNREST = 1.5
@@ -83,9 +80,9 @@ def own_tolerances(
         found = widened_by(found, factor)
         notes.append(
             f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times, for the "
-            f"quarter of them that follows best): soft tissue and joints, and what they leave in the forces, were "
-            f"taken for so many times as large, and a fault must be larger to be seen. Tolerances learned on sessions "
-            f"of your own laboratory without fault (biodance learn) hold for it."
+            f"quarter of them that follows best): soft tissue, and what it leaves in the forces, was taken for so "
+            f"many times as large, and a fault must be larger to be seen. Tolerances learned on sessions of your own "
+            f"laboratory without fault (biodance learn) hold for it."
         )
     if moving and not body.free.all():
         found = with_own_noise(found, of_unseen_joints(body, postures, about), mass)
@@ -135,8 +132,8 @@ def _unrest_note(shaken: Array) -> str:
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:
-    """Return tolerances for soft tissue and joints ``factor`` times as large: their sizes, and what they leave in the
-    wrench beyond them; the mean force is weight, whatever the skin does.
+    """Return tolerances for soft tissue ``factor`` times as large: its sizes, and what it leaves in the wrench beyond
+    them; the mean force is weight, whatever the skin does.
     """
     sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in known.sizes.items()}
     more = np.full((len(known.noise), 6), factor)

@@ -65,9 +65,9 @@ class BodyMass(Effect):
         return np.array([_USUAL * self.mass])
 
     @property
-    def usual(self) -> float:
-        """kg: what this person's clothes and shoes weigh."""
-        return _USUAL * self.mass
+    def usual(self) -> Array:
+        """(1,) kg: what this person's clothes and shoes weigh."""
+        return np.array([_USUAL * self.mass])
 
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""

@@ -27,7 +27,12 @@ class MarkerMisplaced(Effect):
     prior = 0.02
     parameters = tuple(
         Parameter(
-            f"shift_{axis}", "m", 0.010, "up to 20-30 mm between examiners (Osis 2016, PLoS ONE 0147111)", least=_LEAST
+            f"shift_{axis}",
+            "m",
+            0.010,
+            "up to 20-30 mm between examiners (Osis 2016, PLoS ONE 0147111)",
+            least=_LEAST,
+            usual=error_size("soft_tissue", "marker"),
         )
         for axis in "xyz"
     )

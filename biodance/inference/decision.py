@@ -299,14 +299,28 @@ def _is_large(rows: Rows, one: NamedCause) -> bool:
         return False
     if one.course:
         return True
-    usual = one.effect.usual
-    # Parameter 0 only: `usual` is said of the first parameter.
-    if usual > 0 and abs(one.theta[0]) <= usual + one.covariance[0, 0] ** 0.5:
+    if not _is_unusual(one):
         return False
     if rows.problem is None:
         return True
     felt = rows.problem.felt(changes(rows.problem, one.effect, one.theta)[:, None])[0]
     return bool(felt >= 1.0 or (rows.observed(one.effect) != 0).any())
+
+
+def _is_unusual(one: NamedCause) -> bool:
+    """Return whether a cause is larger, by a standard deviation, than laboratories have without calling it a fault: the
+    parameters of which something is usual, as a vector, in units of what is usual in each: sqrt(n) for all n.
+    """
+    usual = one.effect.usual
+    own = np.flatnonzero(usual)
+    if not own.size:
+        return True
+    size = one.theta[own] / usual[own]
+    length = float(np.linalg.norm(size))
+    # Standard deviation of a vector's length: of the vector along its own direction.
+    way = np.zeros(usual.size)
+    way[own] = size / usual[own] / max(length, 1e-300)
+    return length > own.size**0.5 + float(way @ one.covariance @ way) ** 0.5
 
 
 def _is_contradicted(rows: Rows, one: NamedCause) -> bool:

@@ -26,10 +26,12 @@ from biodance.uncertainty.tolerances import Tolerances, between_laboratories, ke
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
-BODY, FIXED, TOLERATED = "body", "fixed", "tolerances"
+BODY, FIXED, PLACED, PLATES, TOLERATED = "body", "fixed", "placed", "plates", "tolerances"
 """Groups of columns: the parameters of the body; errors that several observations share, and causes whose tolerance is
-their spread between real laboratories (`between_laboratories`), which have no scale; causes within other tolerances: a
-laboratory is careful in all of them, or in none."""
+their spread between real laboratories (`between_laboratories`), which have no scale; where joints and markers lie;
+the plates; causes within other tolerances. Who places markers with care has no better plates."""
+CARE = (PLACED, PLATES, TOLERATED)
+"""Groups of causes within tolerances: in each of them a laboratory is careful in all, or in none."""
 SOFT = ("slide", "flesh", "sag", "tilt", FilterMismatch.name)
 """Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
 
@@ -276,7 +278,11 @@ def _group(key: str) -> str:
     if key in between_laboratories():
         return FIXED
     kind = key.removeprefix("habit ").split()[0]
-    return kind if kind in SOFT else TOLERATED
+    if kind in SOFT:
+        return kind
+    if kind.startswith("plate_"):
+        return PLATES
+    return PLACED if kind in ("joint_centre", "segment_length", "marker_misplaced") else TOLERATED
 
 
 def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:

@@ -128,9 +128,9 @@ class Effect(Checked):
         return np.array([parameter.typical for parameter in self.parameters])
 
     @property
-    def usual(self) -> float:
-        """Size of the first parameter up to which laboratories have it here without calling it a fault."""
-        return self.parameters[0].usual_at(self.target)
+    def usual(self) -> Array:
+        """(p,) sizes up to which laboratories have it here without calling it a fault; 0: none is usual."""
+        return np.array([parameter.usual_at(self.target) for parameter in self.parameters])
 
     @property
     def unlike(self) -> float:
