@@ -5,7 +5,7 @@ the markers are the same; exchanged labels are looked for in markers alone.
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,7 +13,7 @@ import pytest
 
 from biodance.effects import labels_swapped
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine
+from biodance.pipeline.session import examine, followed
 from biodance.records import Markers, Session, Trial
 
 KEPT = 4
@@ -36,8 +36,17 @@ def digest(*things: object) -> str:
 
 def examined_beside(session: Session, **how: Any) -> SessionResult:
     """Return the session examined; what only its markers tell is taken from one with the same that was before it."""
+    return _beside(examine, session, how)
+
+
+def followed_beside(session: Session, **how: Any) -> SessionResult:
+    """Return the same without what the segments weigh, as the commands begin."""
+    return _beside(followed, session, how)
+
+
+def _beside(stages: Callable[..., SessionResult], session: Session, how: dict[str, Any]) -> SessionResult:
     key = digest(session.subject, *(part for one in session.trials for part in (one.name, one.role, one.markers)))
-    found = examine(session, **{"earlier": _sessions.pop(key, None), **how})
+    found = stages(session, **{"earlier": _sessions.pop(key, None), **how})
     _sessions[key] = found
     while len(_sessions) > KEPT:
         del _sessions[next(iter(_sessions))]
@@ -56,7 +65,7 @@ def exchanged_once(trial: Trial, static: Markers | None, known: Any = (), others
 def markers_asked_once() -> Iterator[None]:
     """Let the commands take what only markers tell from the session with the same markers that they had before."""
     with pytest.MonkeyPatch.context() as patch:
-        for place in ("biodance.pipeline.session.examine", "biodance.pipeline.front.examine"):
-            patch.setattr(place, examined_beside)
+        for place in ("biodance.pipeline.session.followed", "biodance.pipeline.front.followed"):
+            patch.setattr(place, followed_beside)
         patch.setattr(labels_swapped, "exchanged_labels", exchanged_once)
         yield

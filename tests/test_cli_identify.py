@@ -34,8 +34,8 @@ def lab(monkeypatch, tmp_path):
         monkeypatch.setattr(
             f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder)
         )
-    for room in ("biodance.pipeline.session", "biodance.pipeline.export", "biodance.pipeline.front"):
-        monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])
+    for stages in ("session.followed", "front.followed", "export.examine"):
+        monkeypatch.setattr(f"biodance.pipeline.{stages}", lambda session, **_: results[session.folder.name])
     monkeypatch.setattr("biodance.pipeline.judged_trials.failed_checks", lambda _: (SWAPPED,))  # it holds no raw plates
     return tmp_path
 

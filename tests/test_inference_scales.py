@@ -11,6 +11,7 @@ from scipy.stats import t as student
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.scales import (
+    CONVERGED,
     FLESH,
     FLOOR,
     SPREAD,
@@ -127,11 +128,28 @@ def test_scales_move_along_the_slope_of_the_evidence_by_fisher_s_information() -
     for g in range(3):
         there = [replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)]
         slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
-        expected = np.clip(slope / (known.known[g] + 1 / sd[g] ** 2), -0.7, 0.7)
+        expected = np.clip(slope / (max(known.known[g], known.observed[g]) + 1 / sd[g] ** 2), -0.7, 0.7)
         assert moved.groups[g] == pytest.approx(max(at.groups[g] + expected, FLOOR), abs=1e-5)
     there = [replace(at, noise=at.noise + way * step) for way in (1, -1)]
     slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
     assert (moved.noise > at.noise) == (slope > 0)
+
+
+def test_what_is_observed_of_a_scale_is_the_second_derivative_of_the_evidence() -> None:
+    drawn, at, step = rows(np.random.default_rng(12), observations=0), SCALES[1], 1e-3
+    found, sd = posterior(inner(drawn), prior_sd(drawn), at), prior_sd(drawn)
+    for g in range(3):
+        here = [density(drawn, replace(at, groups=at.groups + way * step * np.eye(3)[g])) for way in (-1, 0, 1)]
+        bent = -np.diff(here, 2)[0] / step**2
+        assert found.curvature(3).observed[g] + 1 / sd[g] ** 2 == pytest.approx(bent, rel=1e-5)
+
+
+@pytest.mark.parametrize("size", [4.0, 8.0, 30.0])
+def test_a_coefficient_larger_than_its_scale_does_not_throw_it_to_and_fro(size: float) -> None:
+    """One coefficient a group, known well: what is expected of its scale, 2, is a third of what is observed."""
+    drawn = rows(np.random.default_rng(13), observations=0, width=1)
+    found = fit(inner(with_target(drawn, drawn.X @ np.full(3, size))), prior_sd(drawn), nominal(drawn))
+    assert nearer(found, prior_sd(drawn)).far(found.scales) < CONVERGED
 
 
 def test_the_information_on_a_scale_is_that_of_many_draws() -> None:

@@ -122,8 +122,8 @@ def test_the_command_says_it_and_writes_and_exports_no_body(failing, monkeypatch
     (tmp_path / "S01").mkdir()
     for room in ("biodance.lab.session.read", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.read_session", lambda folder, **_: replace(found.session, folder=folder))
-    for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
-        monkeypatch.setattr(f"{room}.examine", lambda session, **_: found)
+    for stages in ("session.followed", "export.examine"):
+        monkeypatch.setattr(f"biodance.pipeline.{stages}", lambda session, **_: found)
     assert run(["identify", str(tmp_path / "S01"), "--out", str(tmp_path / "out")]) == NEEDS_A_PERSON
     assert "Identification, segments: Not solved." in capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "out").glob("[!.]*")) == [

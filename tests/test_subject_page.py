@@ -152,7 +152,7 @@ def test_a_session_without_identification_says_so(result):
 
 def test_the_command_writes_it_beside_the_report(result, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("biodance.lab.session.read.read_session", lambda folder, **_: result.session)
-    monkeypatch.setattr("biodance.pipeline.session.examine", lambda session, **_: result)
+    monkeypatch.setattr("biodance.pipeline.session.followed", lambda session, **_: result)
     monkeypatch.setattr("biodance.pipeline.diagnosis.diagnosed_and_corrected", lambda result, **_: (result, None))
     monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
     told = run(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--subject-page", "--json"])

@@ -123,9 +123,11 @@ def _killed(task: SessionTask) -> Outcome:
 
 
 def prepare_workers() -> None:
-    """Start the process from which workers are forked and let it load what they need, so that the first is quick."""
+    """Start the process from which workers are forked and let it load what they need, so that the first is quick; the
+    filters, too, which every session imports when it comes to them.
+    """
     multiprocessing.get_context("forkserver").set_forkserver_preload(
-        ["biodance.pipeline.front", "biodance.report.write"]
+        ["biodance.pipeline.front", "biodance.report.write", "scipy.signal"]
     )
     start_forkserver()
 

@@ -296,12 +296,12 @@ def _examined(
     """Return status, reason and rows of a session that goes through, and the session as read."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
-    from biodance.pipeline.session import examine
+    from biodance.pipeline.session import followed
     from biodance.report.write import write_session
     from biodance.settings import assignments
 
     session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
-    result, found = diagnosed_and_corrected(examine(session, tell=tell), tell=tell)
+    result, found = diagnosed_and_corrected(followed(session, tell=tell), tell=tell)
     tables = folder / TABLES if task.tables else None
     _, document = write_session(result, found, folder, tables=tables, drawn=task.pages, tell=tell)
     first = document["attention"][0]["text"] if document["attention"] else ""

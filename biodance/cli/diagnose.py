@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from biodance.cli import shared
-from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results
+from biodance.cli.session import exit_code, follow_with_reference, put_results, put_session_results
 
 if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult
@@ -90,11 +90,10 @@ def diagnose_command(
 
     with shared.progress() as tell:
         tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
-        result, before, place = examine_with_reference(session, reading, results, tell)
+        result, before, place = follow_with_reference(session, reading, results, tell)
         recorded, folder = result.session, place.part
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
-        result = found.mended.result if found.mended is not None else result
-        result = as_diagnosed(result, found.diagnosis)
+        result = as_diagnosed(found.judged or result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         write_session_tables(tables, result, found.diagnosis, movement=moved)
@@ -172,7 +171,7 @@ def identify_command(
     with shared.progress() as tell:
         tables = results.make_tables_folder(session)
         shown = None if dance is None else Dance.load(dance)
-        result, before, place = examine_with_reference(session, reading, results, tell, dance=shown)
+        result, before, place = follow_with_reference(session, reading, results, tell, dance=shown)
         known = read_lab(reading.lab).tolerances
         result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
         result = by_paper(result) if method == "paper" else result

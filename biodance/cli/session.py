@@ -30,16 +30,18 @@ def report_session(
     lab: Path | None = None,
     for_subject: str | None = None,
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Diagnose an examined session and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
+    """Diagnose a session that was `followed` and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.session import stopped_before
+    from biodance.pipeline.session import identified, stopped_before
     from biodance.report.write import write_session
 
     found = None
     try:
         known = read_lab(lab).tolerances
-        if not result.stopped:
+        if result.stopped:
+            result = identified(result, reference=reference, tell=tell)
+        else:
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
@@ -62,7 +64,7 @@ def exit_code(found: "dict[str, Any]") -> int:
     return shared.DONE if all(row["level"] == "note" for row in found["attention"]) else shared.NEEDS_A_PERSON
 
 
-def examine_with_reference(
+def follow_with_reference(
     session: Path,
     reading: shared.Reading,
     results: shared.Results,
@@ -70,8 +72,8 @@ def examine_with_reference(
     *,
     dance: "Dance | None" = None,
 ) -> "tuple[SessionResult, SessionIdentification | None, ResultsFolder]":
-    """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the
-    results' folder in the making.
+    """Follow a session beside an earlier one of the same person; return what was found (`followed`), what that one
+    said, and the results' folder in the making.
 
     What cannot be read or written is said before the long work starts, and so is a ``dance`` for which the plates are
     too small.
@@ -80,7 +82,7 @@ def examine_with_reference(
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.saved_results import known_body
-    from biodance.pipeline.session import examine
+    from biodance.pipeline.session import followed
 
     if reading.reference and reading.reference.resolve() == session.resolve():
         raise SessionRefused(f"{session}: is itself the --reference. Give an earlier session of the same person.")
@@ -98,7 +100,7 @@ def examine_with_reference(
         from biodance.pipeline.front import identify
 
         before = identify(earlier, tell=tell)
-    return examine(recording, reference=before, known=known, tell=tell), before, place
+    return followed(recording, reference=before, known=known, tell=tell), before, place
 
 
 @shared.app.command(name="report")
@@ -130,7 +132,7 @@ def report_command(
         read_language(spoken)  # what is wrong with it is said before the long work starts
     with shared.progress() as tell:
         tables = results.make_tables_folder(session)
-        result, before, place = examine_with_reference(session, reading, results, tell)
+        result, before, place = follow_with_reference(session, reading, results, tell)
         result, found = report_session(
             result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken
         )

@@ -106,7 +106,7 @@ def demo_command(*, out: shared.OutOption = Path("demo"), force: shared.ForceOpt
     """Simulate a short session with known true values, and report it like a real one."""
     from biodance.lab.session.read import read_session
     from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.session import examine
+    from biodance.pipeline.session import followed
     from biodance.records import Subject
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
@@ -116,7 +116,7 @@ def demo_command(*, out: shared.OutOption = Path("demo"), force: shared.ForceOpt
         with _simulated_anew(session, force=force) as fresh:
             write_session(Subject(62.0, 1.70, "F", 31.0), "short", fresh, seed=1)
         place = results_folder(out / "report", session, force=force)
-        result, found = report_session(examine(read_session(session, tell=tell), tell=tell), place.part, tell)
+        result, found = report_session(followed(read_session(session, tell=tell), tell=tell), place.part, tell)
         folder = put_session_results(place, result.session)
     return print_reported(result, folder, found, False)
 

@@ -4,8 +4,12 @@ With rows y = X u + e, u ~ N(0, diag lambda_g^2), e ~ N(0, s^2) in the plates' r
 Student in the observations, the logarithms a of all scales have normal priors, and their posterior mode is found by
 Fisher scoring. With A = 1 + L X' S^-2 X L (L the scales of the columns), C = A^-1 and e what the posterior mean leaves:
 
-    d log p(y) / d log lambda_g = |u_g|^2 + tr C_gg - n_g         information 2 |1 - C_gg|^2
+    d log p(y) / d log lambda_g = |u_g|^2 + tr C_gg - n_g         information 2 |1 - C_gg|^2, or as observed
     d log p(y) / d log s        = |e|^2 / s^2 + t - n             information 2 (n - t)^2 / n,  t = tr X L C L X' / s^2
+
+What is observed of a group, its own second derivative, is 2 (|u_g|^2 - 2 u_g' C_gg u_g + tr C_gg - |C_gg|^2), whose
+expected value stands above. Where it is larger (coefficients larger than their scale, which its prior holds back), a
+step by what is expected goes too far and back again: the larger of both is taken.
 
 Observations have Student's errors with four degrees of freedom (about one step in twenty is an outlier): their weights
 are iterated (iteratively reweighted least squares). The log evidence is Laplace's approximation over all coefficients.
@@ -78,11 +82,13 @@ class Products:
 @dataclass(frozen=True, eq=False)
 class Curvature:
     """What the data tell of the scales: ``shares`` (G,) trace of the posterior covariance of each group and ``known``
-    (G,) the information on its scale; ``taken`` how many of the plates' rows the columns take.
+    (G,) the information on its scale, ``observed`` (G,) that of just these data; ``taken`` how many of the plates' rows
+    the columns take.
     """
 
     shares: Array
     known: Array
+    observed: Array
     taken: float
 
 
@@ -122,17 +128,19 @@ class ScaledFit:
         """Return what the data tell of the scales of ``count`` groups."""
         group = self.products.group
         half = dpotri(self.lower, lower=True)[0] if group.size else self.lower  # C below its diagonal, zero above
-        own, known = np.diag(half), np.zeros(count)
+        own, known, observed = np.diag(half), np.zeros(count), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
-            within = half.T[np.ix_(here, here)]  # transposed: rows lie together in memory
-            # 2 |1 - C|^2 (Frobenius) from one half: off-diagonals count twice, the diagonal as (1 - C_ii)^2.
-            known[g] = 4 * np.vdot(within, within) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
+            within, u, c = half.T[np.ix_(here, here)], self.u[here], own[here]  # transposed: rows together in memory
+            # What stands beside the diagonal counts twice, from one half: in |C|^2 (Frobenius) and in u'C u.
+            off = 2 * (np.vdot(within, within) - np.sum(c**2))
+            known[g] = 2 * off + 2 * np.sum((1 - c) ** 2)
+            observed[g] = 2 * (u @ u - 4 * u @ within @ u + 2 * c @ u**2 + np.sum(c - c**2) - off)
         plates = self.products.plates[:-1, :-1]
         # tr(L C L X'X) as a sum over products of entries; twice one half less the diagonal counted twice.
         both = 2 * self.size @ (half.T * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
         shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
-        return Curvature(shares, known, float(both * np.exp(-2 * self.scales.noise)))
+        return Curvature(shares, known, observed, float(both * np.exp(-2 * self.scales.noise)))
 
 
 def nominal(rows: Rows) -> Scales:
@@ -229,8 +237,8 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
     at, found, free = one.scales, one.products, one.products.group >= 0
     own = np.bincount(found.group[free], minlength=sd.size)
     square = np.bincount(found.group[free], weights=one.u[free] ** 2, minlength=sd.size) + known.shares
-    # Newton step with the expected information: slope over information, both with the prior's.
-    groups = (square - own - at.groups / sd**2) / (known.known + 1 / sd**2)
+    # Newton step: slope over the larger information, both with the prior's.
+    groups = (square - own - at.groups / sd**2) / (np.maximum(known.known, known.observed) + 1 / sd**2)
     free_rows = max(found.count - known.taken, 0.0)
     slope = one.square * np.exp(-2 * at.noise) + known.taken - found.count - at.noise / LOUD**2
     noise = slope / (2 * free_rows**2 / max(found.count, 1) + 1 / LOUD**2)

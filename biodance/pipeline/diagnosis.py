@@ -55,7 +55,8 @@ def diagnose_session(
     effects: Chosen[Effect | DiscreteEffect] = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
-    """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
+    """Return the diagnosis of a session that was examined, or `followed`, with the gain of every finding on the trials
+    that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
@@ -72,9 +73,8 @@ def diagnose_session(
     if right is not None:
         result, recorded = right.result, recorded_of(right.result)
     mended, recorded = with_faults_undone(result, recorded, right, family, reference=reference, tell=tell)
-    if mended is not None:
-        mended = replace(mended, result=identified(mended.result, reference=reference))
-        result = mended.result
+    result = identified(mended.result if mended else result, reference=reference, tell=tell)
+    mended = replace(mended, result=result) if mended else None
     found = _judged(result, recorded, family, reference=reference, tolerances=tolerances, tell=tell)
     whole = of_family(found.diagnosis, family)
     cases = found.inferred.search.rows.problem.cases if found.inferred and found.inferred.search.rows.problem else ()
@@ -86,9 +86,10 @@ def diagnose_session(
         whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = of_family(replace(whole, findings=with_plate_axes(whole.findings, plates)), family)
-    result = with_weighed_load(result, whole)
-    whole = with_load(whole, _load_of(result, whole))
-    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, found.looked_at)))
+    weighed = with_weighed_load(result, whole)
+    whole = with_load(whole, _load_of(weighed, whole))
+    whole = reconcile_with_checks(whole, weighed, judged_trials(weighed, found.looked_at))
+    return replace(found, diagnosis=whole, judged=result)
 
 
 def _suspects(effects: Chosen[Effect | DiscreteEffect], result: SessionResult) -> Mapping[str, Cause]:
@@ -179,16 +180,18 @@ def diagnosed_and_corrected(
     tolerances: Tolerances | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[SessionResult, SessionDiagnosis | None]:
-    """Return a session identified without what its diagnosis proves to be wrong (`with_proven_corrections`), and the
-    diagnosis of the session as it was recorded; None where the recordings cannot carry one.
+    """Return a session, examined or `followed`, identified without what its diagnosis proves to be wrong
+    (`with_proven_corrections`), and the diagnosis of the session as it was recorded; None where the recordings cannot
+    carry one.
     """
     try:
         found = diagnose_session(result, reference=reference, tolerances=tolerances, tell=tell)
     except BiodanceError:
-        return result, None
-    if result.corrections:
-        return result, found
-    return with_proven_corrections(result, found.inferred, found.mended, reference=reference, tell=tell), found
+        return identified(result, reference=reference, tell=tell), None
+    result = found.judged if found.judged and not found.mended else result
+    if not result.corrections:
+        result = with_proven_corrections(result, found.inferred, found.mended, reference=reference, tell=tell)
+    return identified(result, reference=reference, tell=tell), found
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:

@@ -29,7 +29,7 @@ from biodance.pipeline.identification import SessionIdentification, identify_tri
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import known_body
-from biodance.pipeline.session import by_paper, examine, identification_of
+from biodance.pipeline.session import by_paper, followed, identification_of
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Motion, Session, Trial
@@ -166,7 +166,7 @@ def identify(
     SessionIdentification('visit': solved, 12 segments, 61... kg)
     """
     before = None if reference is None else _earlier(reference, tell)
-    result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
+    result = followed_visit(session, reference=before, body=body, lab=lab, tell=tell)
     result, _ = diagnosed_and_corrected(result, reference=before, tolerances=read_lab(lab).tolerances, tell=tell)
     found = identification_of(by_paper(result) if method == "paper" else result)
     return found if dance is None else replace(found, performance=performance_of(result, dance))
@@ -233,7 +233,7 @@ def diagnose(
     """
     asked = causes(effects)
     before = None if reference is None else _earlier(reference, tell)
-    result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
+    result = followed_visit(session, reference=before, body=body, lab=lab, tell=tell)
     known = tolerances or read_lab(lab).tolerances
     result = result if before is None else _beside(result, before)
     return diagnose_session(result, reference=before, tolerances=known, effects=asked, tell=tell)
@@ -271,7 +271,7 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent)
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
 
 
-def examined_visit(
+def followed_visit(
     session: Visit,
     *,
     reference: SessionIdentification | None = None,
@@ -279,15 +279,15 @@ def examined_visit(
     lab: str | Path | None = None,
     tell: _Tell = _silent,
 ) -> SessionResult:
-    """Return the visit with all stages done; one that was examined already is examined again only where ``body`` or
-    ``lab`` change it.
+    """Return the visit `followed`; one that was examined already is followed again only where ``body`` or ``lab``
+    change it.
     """
     carried, known = read_lab(lab), known_body(body)
     if isinstance(session, SessionResult) and known is None and not carried.corrections:
         return session if reference is None else _beside(session, reference)
     read = session.session if isinstance(session, SessionResult) else session
     read = read if isinstance(read, Session) else read_session(read, tell=tell)
-    return examine(carried.corrected(read), reference=reference, known=known, tell=tell)
+    return followed(carried.corrected(read), reference=reference, known=known, tell=tell)
 
 
 def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:

@@ -252,6 +252,8 @@ class SessionDiagnosis:
         Of all findings together on the kept trials; each has its own.
     looked_at : frozenset of str
         Trials whose forces were compared with a body.
+    judged : SessionResult or None
+        The session in which all was found, with what its segments weigh: as it was examined, or that of ``mended``.
 
     Examples
     --------
@@ -268,6 +270,7 @@ class SessionDiagnosis:
     mended: MendedCopy | None = None
     gain: Gain | None = None
     looked_at: frozenset[str] = frozenset()
+    judged: SessionResult | None = None
 
     def __repr__(self) -> str:
         return f"SessionDiagnosis({self.diagnosis.told})"

@@ -183,7 +183,10 @@ def examine(
     Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
     found = followed(session, reference=reference, known=known, corrections=corrections, earlier=earlier, tell=tell)
-    return identified(found, reference=reference, tell=tell)
+    try:
+        return identified(found, reference=reference, tell=tell)
+    except KeyboardInterrupt:
+        return stopped_before(found, "the segments were identified")
 
 
 @one_thread()
@@ -197,7 +200,7 @@ def followed(
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
     """Return a session through all stages of `examine` but the last: `identified` does that, where somebody asks for
-    the masses of just this copy.
+    the masses of just these recordings; a diagnosis asks for those of the copy in which it put labels and plates right.
     """
     reference_person(session.settings.table, session.subject)
     session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
@@ -226,7 +229,7 @@ def followed(
         checks=(*mass_check(session.subject, weighed, limits), *standing_check(standing, limits)),
         standing=standing,
         weighed=weighed,
-        still=None,
+        still=attempt([], "still", lambda: still_of(body, done)) if body else None,
         identification=None,
         prior=placed.prior,
         shown_joints=shown,
@@ -243,7 +246,11 @@ def identified(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Return a session that was `followed` with what its segments weigh, and its worst frames."""
+    """Return a session that was `followed` with what its segments weigh, and its worst frames; as it is where that was
+    done before.
+    """
+    if result.identification is not None or any(step.name == "identify" for step in result.steps):
+        return result
     body, done, steps, identification = result.body, result.trials, list(result.steps), None
     if body is not None and can_identify(done):
         tell("identifying the segments")
@@ -258,13 +265,9 @@ def identified(
             corrections=result.corrections,
             weighed=result.weighed,
         )
-        try:
-            identification = attempt(steps, "identify", work)
-        except KeyboardInterrupt:
-            steps.append(_stop("the segments were identified"))
-    still = attempt([], "still", lambda: still_of(body, done)) if body else None
+        identification = attempt(steps, "identify", work)
     more = _stills(body, done, identification) if body else ()
-    return replace(result, steps=tuple(steps), identification=identification, still=still, more_stills=more)
+    return replace(result, steps=tuple(steps), identification=identification, more_stills=more)
 
 
 def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:

@@ -25,7 +25,7 @@ from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.load import as_diagnosed
 from biodance.pipeline.movement import SessionMovement, session_movement
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.session import followed, identification_of
 from biodance.pipeline.trial_result import Weighing
 from biodance.records import Session, side_in_name
 from biodance.records.attention import Attention
@@ -382,7 +382,7 @@ def _examined(session: Session, name: str, tell: Callable[[str], None]) -> Exami
     def tell_visit(what: str) -> None:
         tell(f"{name}: {what}")
 
-    result, found = diagnosed_and_corrected(examine(session, tell=tell_visit), tell=tell_visit)
+    result, found = diagnosed_and_corrected(followed(session, tell=tell_visit), tell=tell_visit)
     result = as_diagnosed(result, found.diagnosis) if found else result
     said = (*found.diagnosis.attention, *corrected_attention(result)) if found else session_attention(result)
     identified, unweighed = _body_told(result, name)
