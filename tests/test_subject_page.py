@@ -15,7 +15,7 @@ from made_cycles import walked_knees
 from biodance.cli import run
 from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial_result import OPEN, Check
 from biodance.report.pages.language import read_language
 from biodance.report.pages.subject import PLAIN_NAMES, plain_movement, subject_page
 from biodance.uncertainty.tolerances import shipped
@@ -118,6 +118,11 @@ def test_a_failed_check_gives_no_mass(result, what):
     assert " kg" not in html
     assert "data:image" not in html
     assert grade(html) <= 7
+
+
+def test_frames_whose_posture_is_open_take_no_mass_away_since_none_comes_from_them(result):
+    failed = Check(OPEN, "fit_0", "1.4 %", "at most 1 %", False)
+    assert account_for(replace(result, checks=(failed,))).parts == account_for(result).parts != ()
 
 
 def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(result):

@@ -1,7 +1,8 @@
 """What may be said to the person who was measured: which body parts' masses the session carries, or why none is said.
 
 The rule is one of withholding: a mass stands here only where the session was identified, no check failed, no lasting
-doubt about the body is left and the diagnosis found nothing wrong.
+doubt about the body is left and the diagnosis found nothing wrong. A posture that the markers leave open is no such
+check: its frames are left out of the identification, so that it makes intervals wider and no number wrong.
 """
 
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from biodance.motion.newton import QuietStanding
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import OPEN
 from biodance.records import Subject
 from biodance.uncertainty.tolerances import shipped
 
@@ -102,7 +104,7 @@ def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tupl
         reasons.append(WHY_NOTHING)
     elif found.identification.status == "failed":
         reasons.append(WHY_IMPOSSIBLE)
-    reasons += [check.what for check in result.all_checks if not check.inside]
+    reasons += [check.what for check in result.all_checks if not check.inside and check.what != OPEN]
     reasons += [WHY_DOUBTED] if result.doubts else []
     if diagnosis and not diagnosis.diagnosis.is_clean:
         reasons.append(WHY_FAULTY)
