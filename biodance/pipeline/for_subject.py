@@ -19,6 +19,7 @@ from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import OPEN
 from biodance.records import Subject
+from biodance.settings import STANDARD_GRAVITY
 from biodance.uncertainty.tolerances import shipped
 
 WHY_STOPPED, WHY_NOTHING, WHY_IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
@@ -90,9 +91,13 @@ def account_for(
 
 def _weight(standing: QuietStanding) -> tuple[float, float]:
     """Return the 95 % interval, kg, of who stands still: plates sway with the person, and read a little wrong
-    throughout.
+    throughout, in proportion to the load and by the zero of each of them.
     """
-    reach = SIGMAS * float(np.hypot(standing.mass_sd, standing.mass * shipped().size("plate_gain Fz")))
+    known = shipped()
+    # sd² = sway² + (gain m)² + P (zero / g)²: the readings of all P plates are summed.
+    zeros = np.sqrt(len(standing.plates)) * known.size("plate_offset Fz") / STANDARD_GRAVITY
+    sd = np.linalg.norm([standing.mass_sd, standing.mass * known.size("plate_gain Fz"), zeros])
+    reach = SIGMAS * float(sd)
     return standing.mass - reach, standing.mass + reach
 
 
