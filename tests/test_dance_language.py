@@ -9,7 +9,7 @@ import pytest
 from browser import BROWSER, Page
 from small_dances import small_dance
 
-from biodance.dance.cues import dance_instructions
+from biodance.dance.cues import cue_sheet, dance_instructions
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.search.known_postures import IN_PART, posture_phrases
 from biodance.errors import UnknownName
@@ -42,13 +42,15 @@ def test_cards_say_what_a_person_reads_in_german() -> None:
     dance = with_care()
     result = DanceResult(dance.body, read_plan("patient"), dance, (), None, None, "", (), 1.0)
     page = cards_page(result, "de")
-    seen = re.sub(r'<p class="small" lang="en">.*?</p>|<style>.*?</style>|<[^>]*>', " ", page, flags=re.DOTALL)
+    seen = re.sub(r"<style>.*?</style>|<[^>]*>", " ", page, flags=re.DOTALL)
     assert '<html lang="de">' in page
     for said in (
         "Verbeugen, der linke Arm nach hinten",
         "mit beiden Füßen nebeneinander",
         "von vorn",
         "dann 1 s still",
+        "Menschen, die ermüden",
+        "m Kraftmessplatte von Seite zu Seite",
     ):
         assert said in seen
     assert "Eine Hilfsperson steht" in seen
@@ -56,6 +58,23 @@ def test_cards_say_what_a_person_reads_in_german() -> None:
     assert cards_page(result) == cards_page(result, "en")
     with pytest.raises(UnknownName, match="de"):
         cards_page(result, "xx")
+
+
+def test_the_cue_sheet_is_german_too() -> None:
+    dance, say = with_care(), GERMAN.say
+    result = DanceResult(dance.body, read_plan("patient"), dance, (), None, None, "", (), 1.0, "Schlaganfall")
+    sheet = cue_sheet(
+        dance_instructions(dance, say),
+        ("auf beiden Füßen",) * 2,
+        tempo=(GERMAN.short(2.5), GERMAN.short(1.0)),
+        about=result.about(say, GERMAN.number),
+        rests=(True, False),
+        say=say,
+    )
+    assert sheet.startswith("# Der Tanz, Haltung für Haltung\n")
+    assert "in 2,5 s dorthin, gezählt *eins und zwei*, dann 1 s still halten" in sheet
+    assert "Für die Grenzen einer Person gemacht: Schlaganfall." in sheet
+    assert not re.findall(r"\b(the|with|and|stand|stay|hold|one)\b", sheet)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")

@@ -9,7 +9,7 @@ import pytest
 from limit_cases import BODY, CHAIN, checked, feet, movements
 
 from biodance.body.body import Body
-from biodance.dance.limits import FAR, CheckedMotion, Limit, family, self_collision
+from biodance.dance.limits import FAR, CheckedMotion, ImpreciseCopy, Limit, family, self_collision
 from biodance.dance.limits.self_collision import _ENOUGH, deepest, outside, solid_distances
 from biodance.dance.problem.excitation import dynamic_grams, dynamic_slopes, excitation_blocks, static_grams
 from biodance.dance.problem.nlp import NonlinearProgramme, free_coordinates
@@ -186,6 +186,29 @@ def test_two_codes_find_the_same_distances():
     assert ((found < 0) == (expected < 0)).all()
     far = found >= _ENOUGH
     assert (found[far] <= expected[far] + 1e-9).all()
+
+
+def test_an_arm_that_hangs_may_lie_against_trunk_and_legs():
+    feet = stance(BODY, "parallel").on(0)
+    x = np.zeros((1, CHAIN.size))
+    x[0, 2] = 1.0
+    for hanging in ((), (1,)):
+        here = replace(feet, hanging=hanging)
+        state = close_legs(CHAIN, here, x, *np.zeros((2, *x.shape)))
+        motion = CheckedMotion(BODY, CHAIN.motion(np.zeros(1), state.x, state.v, state.a), here)
+        copied = ImpreciseCopy(BODY, np.zeros(1), motion.motion.q, (here,), np.zeros(1, dtype=np.intp), still=True)
+        limit = self_collision.SelfCollision()
+        found = limit.check(motion)
+        judged = {
+            "margins": limit.margins(state).value[0],
+            "check": found.value[0],
+            "copies": limit.for_imprecise().left(copied).value[0],
+        }
+        for value in judged.values():
+            close = {pair for pair, left in zip(found.of, value, strict=True) if left < 0.02}
+            # both straight arms hang along the trunk: only the one of which nothing is asked may
+            assert any("right_forearm_hand" in pair for pair in close)
+            assert any("left_forearm_hand" in pair for pair in close) == (not hanging)
 
 
 @pytest.mark.parametrize("place", [[0.3, 0.0, 0.0], [0.3, 0.4, 0.5], [0.05, 0.02, 0.01]])

@@ -33,6 +33,7 @@ WRITTEN = (
 )
 DANCED = (
     (REPORT.parent / "dance" / "cues.py", "python"),
+    (REPORT.parent / "pipeline" / "dance.py", "python"),
     (REPORT / "dance.py", "python"),
     (REPORT / "pages" / "language.py", "python"),
     (REPORT / "pages" / "feedback.py", "python"),
@@ -49,8 +50,9 @@ def sentences() -> set[str]:
     code = {one if isinstance(one, str) else one[0] for one in found}
     cues = tomllib.loads((folder("protocols") / "vocabulary" / "cues.toml").read_text(encoding="utf-8"))
     words = {one for group in cues.values() for _, *texts in group.values() for one in texts}
-    care = {one for name in names("protocols/dances") for one in read_plan(name).care}
-    return code | words | care | set(posture_phrases())
+    plans = [read_plan(name) for name in names("protocols/dances")]
+    asked = {one for plan in plans for one in (plan.whom, *plan.care)}
+    return code | words | asked | set(posture_phrases())
 
 
 def catalogue(language: str) -> Catalog:

@@ -15,7 +15,7 @@ from made_cycles import walked_knees
 from biodance.cli import run
 from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial_result import OPEN, Check
 from biodance.report.pages.language import read_language
 from biodance.report.pages.subject import PLAIN_NAMES, plain_movement, subject_page
 from biodance.uncertainty.tolerances import shipped
@@ -85,11 +85,15 @@ def test_a_phone_gets_a_picture_with_letters_that_can_be_read(result):
 
 
 def test_the_weight_is_as_uncertain_as_plates_read_wrong(result):
-    gain, standing = shipped().size("plate_gain Fz"), SimpleNamespace(mass=74.0, mass_sd=0.03)
-    low, high = account_for(replace(result, standing=standing)).weight
-    assert (low + high) / 2 == pytest.approx(standing.mass)
-    assert (high - low) / 2 == pytest.approx(1.96 * np.hypot(gain * standing.mass, standing.mass_sd), rel=1e-3)
-    assert high - low > 0.5, "two plates seldom agree better"
+    gain, zero = (shipped().size(f"plate_{what} Fz") for what in ("gain", "offset"))
+    for plates in (1, 4):
+        standing = SimpleNamespace(mass=74.0, mass_sd=0.03, plates=np.zeros((plates, 4, 2)))
+        low, high = account_for(replace(result, standing=standing)).weight
+        assert (low + high) / 2 == pytest.approx(standing.mass)
+        # sway, gain of the load, and the zero of every plate whose readings are summed
+        variance = 0.03**2 + (gain * 74.0) ** 2 + plates * (zero / 9.80665) ** 2
+        assert (high - low) / 2 == pytest.approx(1.96 * variance**0.5, rel=1e-3)
+        assert high - low > 0.5, "two plates seldom agree better"
 
 
 def test_every_part_has_a_range_or_an_honest_word(result):
@@ -118,6 +122,11 @@ def test_a_failed_check_gives_no_mass(result, what):
     assert " kg" not in html
     assert "data:image" not in html
     assert grade(html) <= 7
+
+
+def test_frames_whose_posture_is_open_take_no_mass_away_since_none_comes_from_them(result):
+    failed = Check(OPEN, "fit_0", "1.4 %", "at most 1 %", False)
+    assert account_for(replace(result, checks=(failed,))).parts == account_for(result).parts != ()
 
 
 def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(result):

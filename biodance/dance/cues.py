@@ -19,7 +19,8 @@ from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0  # degrees: a smaller change is not called
 _HANGING = float(np.radians(80.0))  # rad that knees are bent of somebody who has sat down
-_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight")  # as seconds are counted
+COUNTS = ("one", "two", "three", "four", "five", "six", "seven", "eight")
+"""As seconds are counted."""
 _STEP = 15.0  # degrees to which angles are rounded
 _MOST = 4  # Things that a person can begin at once
 _ALIKE = 12.0  # degrees within which right and left are called as a pair
@@ -46,6 +47,15 @@ def in_english(text: str, **values: str) -> str:
     return text % values
 
 
+Number = Callable[[float, int], str]
+"""Writes a number with so many digits after the decimal sign."""
+
+
+def as_number(value: float, digits: int) -> str:
+    """Return a number as English writes it."""
+    return f"{value:.{digits}f}"
+
+
 CueWords = tuple[str, str, str, str]
 """The part that moves, and what is called for a positive angle, a negative one and (nearly) none."""
 
@@ -60,31 +70,38 @@ def cue_sheet(
     said: tuple[tuple[str, ...], ...],
     stances: tuple[str, ...],
     *,
-    tempo: tuple[float, float] = (2.0, 2.0),
+    tempo: tuple[str, str] = ("2", "2"),
     names: tuple[str, ...] = (),
     about: tuple[str, ...] = (),
     rests: tuple[bool, ...] = (),
+    say: Say = in_english,
 ) -> str:
     """Return the cue sheet (Markdown): what is ``said`` (P) on the way to each posture (`dance_instructions`), and in
     words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
-    they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests.
+    they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests; all
+    of these in the language of ``say``, and ``tempo`` as that writes it.
     """
-    move, hold = tempo
-    counts = " and ".join(_NUMBERS[: max(1, min(len(_NUMBERS), round(move)))])
+    count = max(1, min(len(COUNTS), round(float(tempo[0].replace(",", ".")))))
+    title, counts = say("The dance, posture by posture"), say(" and ").join(say(one) for one in COUNTS[:count])
     lines = [
-        "# The dance, posture by posture",
+        f"# {title}",
         "",
-        f"Each posture: {move:g} s to get there, counted *{counts}*, then {hold:g} s of holding still. Only what moves",
-        "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture "
-        "can be repeated.",
+        say(
+            "Each posture: %(move)s s to get there, counted *%(counts)s*, then %(hold)s s of holding still. Only what "
+            "moves is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; "
+            "the posture can be repeated.",
+            move=tempo[0],
+            counts=counts,
+            hold=tempo[1],
+        ),
         *(line for sentence in about for line in ("", sentence)),
     ]
     for i, (called, stance) in enumerate(zip(said, stances, strict=True)):
         if i == 0 or stance != stances[i - 1]:
             lines += ["", f"## {stance[:1].upper()}{stance[1:]}"]
         name = f"*{names[i][:1].upper()}{names[i][1:]}.* " if names else ""
-        lines += ["", f"**{i + 1}.** {name}{_sentence(called)}"]
-        lines += ["", REST] if rests and rests[i] else []
+        lines += ["", f"**{i + 1}.** {name}{_sentence(called, say)}"]
+        lines += ["", say(REST)] if rests and rests[i] else []
     return "\n".join(lines) + "\n"
 
 
@@ -251,9 +268,10 @@ def _rounded(angle: float) -> float:
     return _STEP * round(abs(angle) / _STEP)
 
 
-def _sentence(said: tuple[str, ...]) -> str:
+def _sentence(said: tuple[str, ...], say: Say) -> str:
     """Return the calls as text: the first ``MOST``, then the rest."""
     if not said:
-        return "Stay as you are."
-    first, rest = "; ".join(said[:_MOST]), "; ".join(said[_MOST:])
-    return f"{first[:1].upper()}{first[1:]}." + (f" And also: {rest}." if rest else "")
+        still = say("stay as you are")
+        return f"{still[:1].upper()}{still[1:]}."
+    first, rest = "; ".join(said[:_MOST]), say("And also: %(calls)s.", calls="; ".join(said[_MOST:]))
+    return f"{first[:1].upper()}{first[1:]}." + (f" {rest}" if said[_MOST:] else "")

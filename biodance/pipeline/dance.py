@@ -17,12 +17,13 @@ from biodance.body.human.human import human
 from biodance.body.human.skeleton import joint_limits
 from biodance.body.similarity import standing_frames
 from biodance.body.urdf import read_urdf
+from biodance.dance.cues import Number, Say, as_number, in_english
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import ForImprecise, Limit, family
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
-from biodance.dance.problem.feet import room_in_words, room_on_plates
+from biodance.dance.problem.feet import AROUND, room_on_plates
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
@@ -180,26 +181,36 @@ class DanceResult:
         return tuple(out)
 
     @property
-    def about(self) -> tuple[str, ...]:
-        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what was left
-        out.
+    def left_out(self) -> tuple[str, ...]:
+        """What was left out or corrected for this person, or because a move was impossible, in sentences."""
+        return (*self.notes, *(self.dance.notes if self.dance else ()))
+
+    def about(self, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
+        """Return what stands before the cues, in the language that ``say`` and ``number`` speak: for whom, the reason
+        of the person's own limits, how safe.
         """
-        out = [f"For {self.plan.whom}."] if self.plan.whom else []
+        out = [say("For %(whom)s.", whom=say(self.plan.whom))] if self.plan.whom else []
         if self.dance and (alone := longest_alone(self.dance)):
-            out.append(f"One foot is off the ground for up to {alone:.0f} s at a time.")
+            out.append(say("One foot is off the ground for up to %(seconds)s s at a time.", seconds=number(alone, 0)))
         if self.dance:
-            out.append(plate_sentence(self.dance))
+            out.append(plate_sentence(self.dance, say, number))
         if self.reason_of_person:
-            out.append(f"Made for one person's limits: {self.reason_of_person}.")
+            out.append(say("Made for one person's limits: %(reason)s.", reason=self.reason_of_person))
         if found := self._left:
-            kept = ", ".join(f"{100 * worst:.1f} cm of {one.words}" for one, worst in found)
+            kept = [
+                say("%(size)s cm of %(what)s", size=number(100 * worst, 1), what=say(one.words)) for one, worst in found
+            ]
             out.append(
-                f"Copied badly by {PERFORMER_COUNT} simulated people (seven degrees off in every joint, a fifth off in "
-                f"time, swaying), it keeps {kept} at the worst moment."
+                say(
+                    "Copied badly by %(count)s simulated people (seven degrees off in every joint, a fifth off in "
+                    "time, swaying), it keeps %(kept)s at the worst moment.",
+                    count=number(PERFORMER_COUNT, 0),
+                    kept=", ".join(kept),
+                )
             )
         else:
-            out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
-        return (*out, *self.notes, *(self.dance.notes if self.dance else ()))
+            out.append(say("Nobody imprecise was tried on this dance: it is for trained people only."))
+        return tuple(out)
 
     @property
     def complete(self) -> bool:
@@ -229,13 +240,38 @@ def not_safe(dance: Dance) -> tuple[str, ...]:
     )
 
 
-def plate_sentence(dance: Dance) -> str:
-    """Return how much force plate a dance needs, and for which it was made."""
-    seated = any(stance.seat for stance in dance.stances)
-    needs = room_in_words(room_on_plates(dance.stances), seated=seated)
-    frame = ", and the legs of the frame stand on plates, too" * any(np.isfinite(s.hands).any() for s in dance.stances)
-    made = dance.plate and f" It is made for a plate of {dance.plate[0]:.2f} m by {dance.plate[1]:.2f} m (--plate)."
-    return f"{needs[:1].upper()}{needs[1:]}{frame}; mark their outlines.{made or ''}"
+def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_number) -> str:
+    """Return how much force plate a dance needs, and for which it was made, in the language of ``say``."""
+    wide, ahead = (number(one, 2) for one in room_on_plates(dance.stances))
+    around = number(100 * AROUND, 1)
+    if any(stance.seat for stance in dance.stances):
+        said = say(
+            "The stool's legs need %(wide)s m of force plate from side to side and %(ahead)s m ahead; mark their "
+            "outlines.",
+            wide=wide,
+            ahead=ahead,
+        )
+    elif any(np.isfinite(stance.hands).any() for stance in dance.stances):
+        said = say(
+            "The feet need %(wide)s m of force plate from side to side and %(ahead)s m ahead, %(around)s cm around "
+            "them included, and the legs of the frame stand on plates, too; mark their outlines.",
+            wide=wide,
+            ahead=ahead,
+            around=around,
+        )
+    else:
+        said = say(
+            "The feet need %(wide)s m of force plate from side to side and %(ahead)s m ahead, %(around)s cm around "
+            "them included; mark their outlines.",
+            wide=wide,
+            ahead=ahead,
+            around=around,
+        )
+    if dance.plate is None:
+        return said
+    wide, ahead = (number(one, 2) for one in dance.plate)
+    made = say("It is made for a plate of %(wide)s m by %(ahead)s m (--plate).", wide=wide, ahead=ahead)
+    return f"{said} {made}"
 
 
 _ALIKE = 0.001

@@ -1,7 +1,8 @@
 """What may be said to the person who was measured: which body parts' masses the session carries, or why none is said.
 
 The rule is one of withholding: a mass stands here only where the session was identified, no check failed, no lasting
-doubt about the body is left and the diagnosis found nothing wrong.
+doubt about the body is left and the diagnosis found nothing wrong. A posture that the markers leave open is no such
+check: its frames are left out of the identification, so that it makes intervals wider and no number wrong.
 """
 
 from dataclasses import dataclass, field
@@ -16,7 +17,9 @@ from biodance.motion.newton import QuietStanding
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import OPEN
 from biodance.records import Subject
+from biodance.settings import STANDARD_GRAVITY
 from biodance.uncertainty.tolerances import shipped
 
 WHY_STOPPED, WHY_NOTHING, WHY_IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
@@ -88,9 +91,13 @@ def account_for(
 
 def _weight(standing: QuietStanding) -> tuple[float, float]:
     """Return the 95 % interval, kg, of who stands still: plates sway with the person, and read a little wrong
-    throughout.
+    throughout, in proportion to the load and by the zero of each of them.
     """
-    reach = SIGMAS * float(np.hypot(standing.mass_sd, standing.mass * shipped().size("plate_gain Fz")))
+    known = shipped()
+    # sd² = sway² + (gain m)² + P (zero / g)²: the readings of all P plates are summed.
+    zeros = np.sqrt(len(standing.plates)) * known.size("plate_offset Fz") / STANDARD_GRAVITY
+    sd = np.linalg.norm([standing.mass_sd, standing.mass * known.size("plate_gain Fz"), zeros])
+    reach = SIGMAS * float(sd)
     return standing.mass - reach, standing.mass + reach
 
 
@@ -102,7 +109,7 @@ def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tupl
         reasons.append(WHY_NOTHING)
     elif found.identification.status == "failed":
         reasons.append(WHY_IMPOSSIBLE)
-    reasons += [check.what for check in result.all_checks if not check.inside]
+    reasons += [check.what for check in result.all_checks if not check.inside and check.what != OPEN]
     reasons += [WHY_DOUBTED] if result.doubts else []
     if diagnosis and not diagnosis.diagnosis.is_clean:
         reasons.append(WHY_FAULTY)

@@ -29,7 +29,7 @@ from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.motion.newton import QuietStanding
 from biodance.observations import recording
 from biodance.observations.stride_force import StrideForce
-from biodance.pipeline.trial_result import Check, TrialResult, WeighedBy, Weighing, trial_fit
+from biodance.pipeline.trial_result import OPEN, Check, TrialResult, WeighedBy, Weighing, trial_fit
 from biodance.records import ROLES, Role, Session, Sip, Subject
 from biodance.settings import TOUCH_FORCE, CheckLimits
 from biodance.threads import Sendable, one_thread
@@ -110,7 +110,7 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
         advice = "See the gaps: which segment lost its markers?"
-        found.append(_upper("posture left open", name, share, limits.open, "%", advice))
+        found.append(_upper(OPEN, name, share, limits.open, "%", advice))
     if result.gaps:
         advice = "Fill the gaps in the capture software."
         found.append(_upper("markers not seen", name, result.gaps_percent, limits.gaps, "%", advice))

@@ -110,6 +110,10 @@ class WrenchComparison:
         return display.side_by_side(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
 
 
+OPEN = "posture left open"
+"""The check of frames in which the markers do not fix the posture; they are left out of all comparisons of forces."""
+
+
 @dataclass(frozen=True)
 class Check:
     """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is

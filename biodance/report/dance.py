@@ -87,7 +87,7 @@ def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:
         minutes=words.count("about %(number)s minute", "about %(number)s minutes", max(1, round(dance.duration / 60))),
         move=words.short(float(np.median(dance.move))),
         hold=words.short(float(np.max(dance.hold))),
-        about=result.about,
+        about=result.about(say, words.number),
         care=[say(one) for one in dance.care],
         unsafe=not_safe(dance),
         cues=cues,
@@ -153,7 +153,7 @@ _DANCE = Schema(
         "instructions": _counted,
         "room_on_plates_m": lambda made: room_on_plates(made.dance.stances) if made.dance else None,
         "simplicity_price": _price,
-        "notes": lambda made: (*made.notes, *(made.dance.notes if made.dance else ())),
+        "notes": lambda made: made.left_out,
     },
 )
 
@@ -202,7 +202,8 @@ def write_dance(
         dance.save(folder / "dance.npz")
         if despite or not dance.unsafe:
             texts |= _leading(result, dance, folder, language)
-        texts["margins.md"] = _MARGINS.format(markdown_table(MARGIN_ROW, found["margins"]))
+        left_out = "\n\n".join(("", "# What was left out or corrected", *result.left_out)) if result.left_out else ""
+        texts["margins.md"] = _MARGINS.format(markdown_table(MARGIN_ROW, found["margins"])) + left_out
         counted = np.flatnonzero(dance.counted).tolist()
         titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
         postures = held_postures(dance, counted).q
@@ -233,13 +234,16 @@ def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Pa
         return {"cues.md": angle_sheet(dance), "dance.csv": angle_table(dance)}
     path = folder / "dance.c3d"
     write_c3d(path, markers=preview_markers(dance), parameters=preview_parameters(dance))
+    words = read_language(language)
+    say = words.say
     cues = cue_sheet(
-        dance_instructions(dance),
-        tuple(stance_words(s) for s in dance.stances),
-        tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
-        names=dance.names,
-        about=(*not_safe(dance), *dance.care, *result.about),
+        dance_instructions(dance, say),
+        tuple(say(stance_words(s)) for s in dance.stances),
+        tempo=(words.short(float(np.median(dance.move))), words.short(float(np.max(dance.hold)))),
+        names=tuple(posture_said(name, say) for name in dance.names),
+        about=(*not_safe(dance), *(say(one) for one in dance.care), *result.about(say, words.number)),
         rests=rests(dance),
+        say=say,
     )
     return {"cues.md": cues, "cues.html": cards_page(result, language)}
 

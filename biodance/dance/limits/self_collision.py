@@ -1,4 +1,5 @@
-"""Limbs, trunk and pelvis do not touch each other (paper eq. 14, d > 0).
+"""Limbs, trunk and pelvis do not touch each other (paper eq. 14, d > 0). An arm that hangs, asked for nothing, may lie
+against trunk and legs, as arms do.
 
 Exact distances: of two line segments for two capsules, of a line segment from a box for a capsule and a box.
 """
@@ -10,7 +11,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.limits import FAR, CheckedMotion, ForImprecise, ImpreciseCopy, Limit, Margins, Remaining, bounded
-from biodance.dance.problem.shapes import Solids, points_apart, points_off_box, points_on_axis
+from biodance.dance.problem.shapes import Solids, may_touch, points_apart, points_off_box, points_on_axis
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import Poses
 from biodance.records import Array
@@ -20,6 +21,7 @@ SAMPLES = np.linspace(0.0, 1.0, 33)
 _ROUNDS = 6  # Of the search, which leaves a sixteenth of the line each time
 _ENOUGH = 0.05  # m: a distance above it is given as what is certain
 _POINTS = 5  # Points on the axis of a capsule for the first look
+_FREE = 1.0  # m said of two segments that may touch
 
 
 @dataclass(frozen=True)
@@ -33,15 +35,16 @@ class SelfCollision(Limit):
     def margins(self, state: State) -> Margins:
         """Return the distances (T, pairs) m between surfaces, less the gap."""
         near, far = (part(state, self.gap + FAR * self.scale) for part in (_capsules, _boxes))
-        return Margins(
-            np.concatenate([near.value, far.value], axis=1) - self.gap,
-            np.concatenate([near.slopes, far.slopes], axis=2),
-        )
+        value = np.concatenate([near.value, far.value], axis=1) - self.gap
+        slopes = np.concatenate([near.slopes, far.slopes], axis=2)
+        free = may_touch(state.chain.body, state.stance.hanging)
+        value[:, free], slopes[:, :, free] = _FREE, 0.0
+        return Margins(value, slopes)
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distances (T, pairs) m between surfaces by coal, less the gap; a large one is a lower bound."""
         apart, pairs = solid_distances(motion.body, motion.pose)
-        return Remaining(apart - self.gap, tuple(pairs))
+        return Remaining(np.where(may_touch(motion.body, motion.stance.hanging), _FREE, apart - self.gap), tuple(pairs))
 
     def for_imprecise(self) -> ForImprecise:
         """Segments stay ``room`` apart."""
@@ -53,7 +56,9 @@ LIMIT = SelfCollision
 
 def _left(copy: ImpreciseCopy) -> Remaining:
     """Return the distances (T, pairs) m between surfaces, in closed form; large ones of moving people: lower bounds."""
-    return Remaining(*surface_distances(copy.body, copy.pose, near=np.inf if copy.still else _CLOSE))
+    apart, pairs = surface_distances(copy.body, copy.pose, near=np.inf if copy.still else _CLOSE)
+    # Who holds a frame or hangs an arm does so throughout a dance.
+    return Remaining(np.where(may_touch(copy.body, copy.stances[0].hanging), _FREE, apart), pairs)
 
 
 def _capsules(state: State, near: float) -> Margins:

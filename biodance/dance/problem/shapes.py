@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.motion.kinematics import Poses, poses
-from biodance.records import Array
+from biodance.records import SIDES, Array
 
 BOXES = ("pelvis", "trunk_head")
 _KINDS = {
@@ -87,6 +87,20 @@ class Solids:
         shape = [capsule(body, i) for i in range(len(body.segments))]
         axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
         return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)
+
+
+_ARM = ("upper_arm", "forearm_hand")
+
+
+def may_touch(body: Body, hanging: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return which of the pairs of limbs, then of limbs and boxes, (C + B,) are an arm that hangs (``hanging``: 0
+    right, 1 left) and anything but an arm.
+    """
+    solids = Solids.of(body)
+    arms, hang = ({f"{SIDES[k]}_{part}" for k in which for part in _ARM} for which in ((0, 1), hanging))
+    pairs = zip([*solids.first, *solids.limb], [*solids.second, *solids.box], strict=True)
+    names = [{body.segments[i], body.segments[j]} for i, j in pairs]
+    return np.array([bool(both & hang) and not both <= arms for both in names], dtype=bool)
 
 
 def palm(body: Body, side: str) -> tuple[int, Array]:

@@ -159,8 +159,10 @@ COMPOSED = (
     *(N_("with the right foot in front, the weight on the left one"),),
     *(N_("on the right leg alone"), N_("on the left leg alone")),
     N_("Then rest: let the arms down. Take up this posture again when you are ready."),
+    *(N_("one"), N_("two"), N_("three"), N_("four"), N_("five"), N_("six"), N_("seven"), N_("eight")),
+    *(N_("reserve for the balance"), N_("room under hands, knees and head"), N_("room between arms, legs and trunk")),
 )
-"""What is called, where the feet are, and when to rest."""
+"""What is called and counted, where the feet are, when to rest, and what imprecise people keep."""
 SHOWN = (
     *(N_("pelvis"), N_("trunk and head")),
     *(N_("left thigh"), N_("left shank"), N_("left foot"), N_("left upper arm"), N_("left forearm and hand")),

@@ -219,7 +219,6 @@ _WHY = {
     "mass on the plates": N_("The weight on our plates was not the weight we wrote down."),
     "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
     "marker distance": N_("The small balls on your skin were not where our model of you had them."),
-    "posture left open": N_("The cameras could not see all parts of you all the time."),
     "markers not seen": N_("The cameras lost some of the small balls on your skin for too long."),
     "fully measured": N_("You had both feet on our plates for too short a time."),
     "force difference": N_("The push on the plates was not what your moves should give."),
