@@ -42,7 +42,7 @@ def test_squats_whose_forces_come_late_are_not_judged(tmp_path: Path, monkeypatc
     how, loads = hide(late, SUBJECT, plan, seed=3, visit=LabVisit(0))
     folder = simulate_session(SUBJECT, plan, tmp_path / "late", seed=3, visit=how, loads=loads)
     result = examined(folder, monkeypatch)
-    rows = {row.trial: row for row in diagnose_session(result).diagnosis.judged}
+    rows = {row.trial: row for row in diagnose_session(result, effects=("time_delay",)).diagnosis.judged}
     squats = [one for one in result.trials if one.name.startswith("squat")]
     assert squats
     for one in squats:

@@ -26,7 +26,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.dance import DanceResult
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.plates import PlatesJudged
-from biodance.pipeline.session import examine
+from biodance.pipeline.session import examine, identification_of
 from biodance.report.dance import cards_page
 from biodance.report.pages.feedback import write_feedback
 from biodance.report.pages.subject import subject_page
@@ -55,7 +55,8 @@ def _of_a_session(folder: Path) -> dict[str, Path]:
     """Return the pages of a session with a fault beside another one of the same person, of the person with and without
     numbers, and of a session in which nothing could be done.
     """
-    before = biodance.identify(hidden(folder / "S02", visit=1, trials=("static", "move_1")))
+    earlier = examine(read_session(hidden(folder / "S02", visit=1, trials=("static", "move_1"))))
+    before = identification_of(earlier)
     now = hidden(folder / "S01", "plate_gain:target=Fz,gain=0.06", trials=("static", "move_1", "squat_1"))
     result = examine(read_session(now), reference=before)
     found, moved = biodance.diagnose(result, reference=before), biodance.describe_movement(result)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 from inject import inject
+from shared_markers import examined_beside, markers_asked_once
 
 from biodance.diagnosis.reasons import Reason
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.pipeline.session import examine
 from biodance.virtual_lab.causes import fault_of, parse_cause
 
 FAULT = "plate_gain:target=plate1:Fz,gain=0.08"
@@ -29,9 +29,10 @@ def walks(data: Path, folder: Path, fault: str = "") -> Path:
 def test_walks_without_a_static_trial_are_compared_with_a_body(
     data: Path, tmp_path: Path, fault: str, named: tuple[tuple[str, str], ...]
 ) -> None:
-    result = examine(read_session(walks(data, tmp_path, fault)))
+    result = examined_beside(read_session(walks(data, tmp_path, fault)))
     assert result.scaled
-    found = diagnose_session(result).diagnosis
+    with markers_asked_once():
+        found = diagnose_session(result).diagnosis
     assert Reason.BODY_NOT_SCALED not in found.why
     assert tuple((one.effect, one.target) for one in found.findings) == named
     assert found.adequacy  # the forces were compared with the simulation

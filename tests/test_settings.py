@@ -17,6 +17,7 @@ from biodance.motion.contact import ground_contact
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.identification import trial_checks
 from biodance.pipeline.saved_results import provenance
+from biodance.pipeline.session import followed
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.settings import USUAL, ContactRules, Settings, assignments
 from biodance.virtual_lab.simulate import simulate_session
@@ -46,10 +47,10 @@ def squat(folder):
 
 
 def short(folder, **changes):
-    """Return the static trial and the squat, examined with some settings changed."""
+    """Return the static trial and the squat, followed with some settings changed: nobody asks for masses here."""
     session = biodance.read_session(folder, settings={key.replace("__", "."): value for key, value in changes.items()})
     trials = (replace(session["squat_1"], role="fit"), session["static"])
-    return biodance.examine(replace(session, trials=trials))
+    return followed(replace(session, trials=trials))
 
 
 @pytest.fixture(scope="module")
@@ -168,9 +169,7 @@ def test_a_choice_changes_the_simulated_wrench(changes, least, usual, folder):
 
 
 def test_joints_are_static_where_that_was_chosen(folder):
-    found = [
-        biodance.examine(biodance.read_session(folder, settings={"joints": how})) for how in ("functional", "static")
-    ]
+    found = [followed(biodance.read_session(folder, settings={"joints": how})) for how in ("functional", "static")]
     assert [bool(one.body.joint_errors) for one in found] == [True, False]
     assert moved(*found) > 0.5
 

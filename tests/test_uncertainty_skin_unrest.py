@@ -171,7 +171,8 @@ def test_flesh_that_lags_behind_is_swing_and_no_wave() -> None:
 def test_restless_skin_is_no_alarm() -> None:
     """Taken for as quiet as elsewhere, waves of 1.8 mm are forces that nothing explains."""
     session = restless(0.0018)
-    own = own_tolerances(body(), session, known=known()).tolerances
-    alarmed, calm = (inferred(body(), session, tolerances=under).diagnosis for under in (known(), own))
+    alarmed = inferred(body(), session, tolerances=known()).diagnosis
     assert (alarmed.verdict, alarmed.findings) == ("unexplained", ())
+    own = own_tolerances(body(), session, known=known()).tolerances
+    calm = inferred(body(), session, tolerances=own).diagnosis
     assert (calm.verdict, calm.findings) == ("nothing wrong", ())

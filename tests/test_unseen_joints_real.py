@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from inject import inject
+from shared_markers import examined_beside, markers_asked_once
 
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.pipeline.session import examine
 from biodance.records import Session
 from biodance.virtual_lab.causes import fault_of, parse_cause
 
@@ -31,10 +31,11 @@ def diagnosed(data: Path, folder: Path, text: str) -> Diagnosis:
     source = data / "biomechzoo/HC044A"
     for path in sorted(source.glob("*.c3d")) if text else ():
         inject(path, folder / path.name, fault_of(parse_cause(text), {path.stem: (0.0, 1.0)}))
-    result = examine(of_legs(read_session(folder if text else source)))
+    result = examined_beside(of_legs(read_session(folder if text else source)))
     assert result.body is not None
     assert not result.body.free.all()
-    return diagnose_session(result).diagnosis
+    with markers_asked_once():
+        return diagnose_session(result).diagnosis
 
 
 def test_legs_alone_of_a_faultless_walk_are_clean(data: Path, tmp_path: Path) -> None:

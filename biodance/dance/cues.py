@@ -70,18 +70,19 @@ def cue_sheet(
     said: tuple[tuple[str, ...], ...],
     stances: tuple[str, ...],
     *,
-    tempo: tuple[str, str] = ("2", "2"),
+    tempo: tuple[float, float] = (2.0, 2.0),
     names: tuple[str, ...] = (),
     about: tuple[str, ...] = (),
     rests: tuple[bool, ...] = (),
     say: Say = in_english,
+    short: Callable[[float], str] = "{:g}".format,
 ) -> str:
     """Return the cue sheet (Markdown): what is ``said`` (P) on the way to each posture (`dance_instructions`), and in
     words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
     they are known ones; ``about`` sentences that stand before them; ``rests`` (P) after which the person rests; all
-    of these in the language of ``say``, and ``tempo`` as that writes it.
+    of these in the language of ``say``, which writes numbers as ``short`` does.
     """
-    count = max(1, min(len(COUNTS), round(float(tempo[0].replace(",", ".")))))
+    count = max(1, min(len(COUNTS), round(tempo[0])))
     title, counts = say("The dance, posture by posture"), say(" and ").join(say(one) for one in COUNTS[:count])
     lines = [
         f"# {title}",
@@ -90,9 +91,9 @@ def cue_sheet(
             "Each posture: %(move)s s to get there, counted *%(counts)s*, then %(hold)s s of holding still. Only what "
             "moves is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; "
             "the posture can be repeated.",
-            move=tempo[0],
+            move=short(tempo[0]),
             counts=counts,
-            hold=tempo[1],
+            hold=short(tempo[1]),
         ),
         *(line for sentence in about for line in ("", sentence)),
     ]

@@ -53,8 +53,8 @@ def _shown(rows: Rows, columns: VisibleColumns, found: ScaledFit, quiet: Array) 
     taken = np.sum(solve_triangular(found.lower, X.T, lower=True, check_finite=False) ** 2, axis=0)
     left = rows.y[:n] - X @ found.u
     count, square, took = (np.bincount(rows.block[:n], weight, len(quiet)) for weight in (np.ones(n), left**2, taken))
-    # At the expected noise; at the session's own it were over exp(2 noise), too (decision one-posterior, 2).
-    free = count - took / quiet**2
+    # Degrees of freedom taken at the noise of this round: rows weigh exp(-2 noise) / quiet^2.
+    free = count - took * np.exp(-2 * found.scales.noise) / quiet**2
     there = (count > 0) & (free > 0)
     size = np.zeros(len(quiet))
     size[there] = 0.5 * np.log(np.maximum(square[there] / free[there], 1e-12))

@@ -239,11 +239,12 @@ def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Pa
     cues = cue_sheet(
         dance_instructions(dance, say),
         tuple(say(stance_words(s)) for s in dance.stances),
-        tempo=(words.short(float(np.median(dance.move))), words.short(float(np.max(dance.hold)))),
+        tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
         names=tuple(posture_said(name, say) for name in dance.names),
         about=(*not_safe(dance), *(say(one) for one in dance.care), *result.about(say, words.number)),
         rests=rests(dance),
         say=say,
+        short=words.short,
     )
     return {"cues.md": cues, "cues.html": cards_page(result, language)}
 
