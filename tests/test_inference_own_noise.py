@@ -9,8 +9,10 @@ from inferred_rows import DrawnRows, rows
 
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.effects import causes
-from biodance.inference.own_noise import own_noise
+from biodance.inference.columns import VisibleColumns
+from biodance.inference.own_noise import _shown, own_noise
 from biodance.inference.rows import rows_of
+from biodance.inference.scales import LOUD, fit, nominal, prior_sd, products
 from biodance.inference.session import see
 from biodance.pipeline.judged_trials import chosen_windows
 from biodance.pipeline.results import SessionResult
@@ -94,3 +96,23 @@ def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
     share = np.sqrt(np.einsum("bcc->bc", white @ found @ white.swapaxes(1, 2)))
     assert np.median(share) < 0.9  # the shortest walk has 108 rows, which say little of 30 sizes
     assert share.max() > 0.9
+
+
+def test_columns_take_degrees_of_freedom_at_the_noise_of_the_session() -> None:
+    """Against dense matrices: in a loud session columns take less of a quiet channel than at the expected noise."""
+    some = drawn(np.where(np.arange(BLOCKS) % 2, 3.0, 0.8), each=3)
+    columns, quiet = VisibleColumns.of(some), np.ones(some.noises + 1)
+    quiet[:BLOCKS] = 0.9
+    one = fit(products(columns, np.empty((len(some.y), 0)), some.y, 1 / quiet), prior_sd(some), nominal(some))
+    assert one.scales.noise > 0.3
+    n, X = some.plates, columns.X * one.size
+    sure = np.ones(len(some.y))
+    sure[:n], sure[some.simulated :] = np.exp(-2 * one.scales.noise) / 0.9**2, one.scales.weights
+    # Posterior mean of the rows = H y, H = X (X'WX + 1)^-1 X'W; its trace within a block is what columns take there.
+    fitted = X @ np.linalg.solve((X.T * sure) @ X + np.eye(X.shape[1]), X.T * sure)
+    left = some.y - fitted @ some.y
+    for q in range(0, BLOCKS, 2):
+        at = np.flatnonzero(some.block == q)
+        free = at.size - np.trace(fitted[np.ix_(at, at)])
+        raw = 0.5 * np.log(left[at] @ left[at] / free) * 2 * free / (2 * free + 1 / LOUD**2)
+        assert _shown(some, columns, one, quiet)[q] == pytest.approx(np.clip(np.exp(raw), 0.5, 1.0), rel=1e-6)
