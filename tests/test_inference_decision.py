@@ -13,7 +13,8 @@ from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, Parameter
 from biodance.effects.body_mass import BodyMass
-from biodance.inference.decision import IN_SET, NAMED, places, well
+from biodance.effects.marker_misplaced import MarkerMisplaced
+from biodance.inference.decision import IN_SET, NAMED, _is_unusual, places, well
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.sets import hypothesis
 from biodance.observations import Observation
@@ -171,6 +172,23 @@ def test_half_a_kilogram_of_clothes_is_usual_on_an_adult_and_much_on_a_child(
     cause = NamedCause(BodyMass(mass=person), np.array([0.5]), np.array([[0.01]]))
     every = posterior(holding(bare, np.log(0.3)), replace(holding(bare, np.log(0.7)), causes=(cause,)))
     assert well(bare.rows, every, unknown_matters=False) == pytest.approx(probability)
+
+
+@pytest.mark.parametrize(
+    ("shift_mm", "sd_mm", "told"),
+    [
+        ((-4.0, -8.8, 6.5), 1.0, False),  # 11.6 mm
+        ((8.0, 8.0, 8.0), 1.0, False),  # 13.9 mm, what skin does on every axis
+        ((0.0, -20.0, 0.0), 1.0, True),
+        ((0.0, -20.0, 0.0), 8.0, False),
+    ],
+)
+def test_a_marker_has_moved_where_it_lies_farther_away_than_skin_carries_it(
+    shift_mm: tuple[float, ...], sd_mm: float, told: bool
+) -> None:
+    """By a standard deviation; skin carries it by 8 mm an axis, 13.9 mm in all."""
+    one = NamedCause(MarkerMisplaced("C7"), 1e-3 * np.array(shift_mm), 1e-6 * sd_mm**2 * np.eye(3))
+    assert _is_unusual(one) is told
 
 
 @pytest.mark.parametrize(

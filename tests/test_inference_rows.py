@@ -18,11 +18,12 @@ from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, effects
 from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.rows import BODY, TOLERATED, rows_of
+from biodance.inference.rows import BODY, PLACED, PLATES, TOLERATED, _group, rows_of
 from biodance.inference.scales import bare, nominal, posterior, prior_sd
 from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.observations import ObservableCause, Observation
 from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import shipped
 
 OFFSET = ("plate_offset", "Fx")
 SIZE = 0.3
@@ -89,15 +90,26 @@ def test_columns_of_one_kind_are_one_group_and_share_a_scale() -> None:
     """What observations share has none: how it errs was learned with it."""
     found, _ = rows(told(1.0, 2.0, sd=1.0, norms=0.5))
     assert found.groups[0] == BODY
-    assert found.groups[-1] == TOLERATED
+    assert found.groups[-1] == PLATES
     assert found.group[-1] == -1
-    assert {found.group[where.start] for where, _ in found.tolerated.values()} == {found.groups.index(TOLERATED)}
+    assert {found.group[where.start] for where, _ in found.tolerated.values()} == {found.groups.index(PLATES)}
     first = found.problem.sip.shape[1]
     assert (found.group[:first] == 0).all()
     blocks = found.block[: found.plates].reshape(-1, 6)
     np.testing.assert_array_equal(blocks, 6 * found.problem.spectrum.band[:, None] + np.arange(6))
     assert found.block.max() == 6 * len(BANDS)
     assert (found.block[found.simulated :] == -1).all()
+
+
+def test_markers_plates_and_other_tolerances_have_scales_of_their_own() -> None:
+    """Who places markers with care has no better plates."""
+    chosen = ("plate_offset", "plate_gain", "body_mass")
+    put = problem(body(), short(nothing), chosen=chosen)
+    found = rows_of(put, causes_of(put, shipped(), chosen), shipped(), SILENT)
+    at = {name: found.group[where.start] for (name, _), (where, _) in found.tolerated.items()}
+    of = {name: found.groups[group] for name, group in at.items() if group >= 0}
+    assert {"plate_offset": PLATES, "plate_gain": PLATES, "body_mass": TOLERATED}.items() <= of.items()
+    assert _group("marker_misplaced C7") == _group("joint_centre knee before") == PLACED
 
 
 def test_a_spread_between_laboratories_has_no_scale() -> None:
@@ -111,7 +123,7 @@ def test_a_spread_between_laboratories_has_no_scale() -> None:
     for found in (rows_of(put, causes, own, SILENT), rows_of(None, causes, own, told(1.0, 2.0, sd=1.0))):
         groups = {name: found.group[where.start] for name, (where, _) in found.tolerated.items()}
         assert groups.pop(late) == -1
-        assert set(groups.values()) == {found.groups.index(TOLERATED)}
+        assert set(groups.values()) == {found.groups.index(PLATES)}
 
 
 def test_a_tolerance_is_the_same_in_plates_and_observations() -> None:

@@ -113,7 +113,8 @@ def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool)
     assert own.tolerances.size("slide thigh") == pytest.approx(
         shipped().size("slide thigh") * (factor if grows else 1.0)
     )
-    assert own.tolerances.size("plate_gain Fz") == shipped().size("plate_gain Fz")
+    for bone in ("joint_centre hip", "segment_length thigh", "tilt knee", "marker_misplaced KNE", "plate_gain Fz"):
+        assert own.tolerances.size(bone) == shipped().size(bone) > 0, bone
     more = factor if grows else 1.0
     np.testing.assert_allclose(own.tolerances.noise[1:], more**2 * shipped().noise[1:])
     near = own_tolerances(body(), windows(1, trials=1), known=known)
