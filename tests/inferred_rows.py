@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.diagnosis.candidates import SCALE, Candidate, log_priors
-from biodance.effects import Effect, Parameter
+from biodance.effects import Care, Effect, Parameter
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.rows import BODY, TOLERATED, Rows
+from biodance.inference.rows import BODY, Rows
 from biodance.inference.scales import LOUD, Scales, prior_sd
 from biodance.inference.sets import Search
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
-GROUPS = (BODY, "slide", TOLERATED)
+GROUPS = (BODY, "slide", Care.OTHER)
 """Groups of the drawn columns."""
 
 

@@ -31,7 +31,7 @@ from biodance.identification.mismatch import mismatch, temper
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.dynamics import predict_wrench, regressor
-from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.dance import DanceResult, before_cues
 from biodance.records import Motion, Subject
 from biodance.report.dance import dance_document
 from biodance.uncertainty.caution import widened_prior
@@ -125,14 +125,14 @@ def test_the_price_and_what_cannot_be_learned_are_said() -> None:
     assert price["mass_kg"]["with"] > price["mass_kg"]["without"]
     assert price["com_m"] == {"with": 0.010, "without": 0.008}
     assert "chosen freely" in result.price
-    assert result.price not in result.about  # which the person reads who dances
+    assert result.price not in before_cues(result)  # which the person reads who dances
     (warning,) = result.warnings
     assert "4.6 times its bound" in warning
     assert "left foot" in warning
     assert f"It cannot teach the mass of {BODY.segments[3].replace('_', ' ')}" in warning
     near = replace(result, account=replace(poor, static=180.0))
     assert near.warnings == ()
-    assert not any("criterion" in sentence for sentence in result.about)
+    assert not any("criterion" in sentence for sentence in before_cues(result))
 
 
 # ---- How well a dance was danced

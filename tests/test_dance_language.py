@@ -13,7 +13,7 @@ from biodance.dance.cues import cue_sheet, dance_instructions
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.search.known_postures import IN_PART, posture_phrases
 from biodance.errors import UnknownName
-from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.dance import DanceResult, before_cues
 from biodance.report.dance import cards_page
 from biodance.report.pages.feedback import write_feedback
 from biodance.report.pages.language import posture_said, read_language
@@ -66,8 +66,9 @@ def test_the_cue_sheet_is_german_too() -> None:
     sheet = cue_sheet(
         dance_instructions(dance, say),
         ("auf beiden Füßen",) * 2,
-        tempo=(GERMAN.short(2.5), GERMAN.short(1.0)),
-        about=result.about(say, GERMAN.number),
+        tempo=(2.5, 1.0),
+        short=GERMAN.short,
+        about=before_cues(result, say, GERMAN.number),
         rests=(True, False),
         say=say,
     )

@@ -15,10 +15,10 @@ from biodance.diagnosis.candidates import SCALE, candidate
 from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import NamedCause, effects
+from biodance.effects import Care, NamedCause, effects
 from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.rows import BODY, PLACED, PLATES, TOLERATED, _group, rows_of
+from biodance.inference.rows import BODY, rows_of
 from biodance.inference.scales import bare, nominal, posterior, prior_sd
 from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.observations import ObservableCause, Observation
@@ -90,9 +90,9 @@ def test_columns_of_one_kind_are_one_group_and_share_a_scale() -> None:
     """What observations share has none: how it errs was learned with it."""
     found, _ = rows(told(1.0, 2.0, sd=1.0, norms=0.5))
     assert found.groups[0] == BODY
-    assert found.groups[-1] == PLATES
+    assert found.groups[-1] == Care.PLATES
     assert found.group[-1] == -1
-    assert {found.group[where.start] for where, _ in found.tolerated.values()} == {found.groups.index(PLATES)}
+    assert {found.group[where.start] for where, _ in found.tolerated.values()} == {found.groups.index(Care.PLATES)}
     first = found.problem.sip.shape[1]
     assert (found.group[:first] == 0).all()
     blocks = found.block[: found.plates].reshape(-1, 6)
@@ -101,15 +101,16 @@ def test_columns_of_one_kind_are_one_group_and_share_a_scale() -> None:
     assert (found.block[found.simulated :] == -1).all()
 
 
-def test_markers_plates_and_other_tolerances_have_scales_of_their_own() -> None:
+def test_plates_have_a_scale_beside_other_tolerances() -> None:
     """Who places markers with care has no better plates."""
     chosen = ("plate_offset", "plate_gain", "body_mass")
     put = problem(body(), short(nothing), chosen=chosen)
     found = rows_of(put, causes_of(put, shipped(), chosen), shipped(), SILENT)
     at = {name: found.group[where.start] for (name, _), (where, _) in found.tolerated.items()}
     of = {name: found.groups[group] for name, group in at.items() if group >= 0}
-    assert {"plate_offset": PLATES, "plate_gain": PLATES, "body_mass": TOLERATED}.items() <= of.items()
-    assert _group("marker_misplaced C7") == _group("joint_centre knee before") == PLACED
+    assert {"plate_offset": Care.PLATES, "plate_gain": Care.PLATES, "body_mass": Care.OTHER}.items() <= of.items()
+    plates = {name for name in effects() if name.startswith("plate_")}
+    assert {name for name, one in effects().items() if one.care is Care.PLATES} == plates
 
 
 def test_a_spread_between_laboratories_has_no_scale() -> None:
@@ -123,7 +124,7 @@ def test_a_spread_between_laboratories_has_no_scale() -> None:
     for found in (rows_of(put, causes, own, SILENT), rows_of(None, causes, own, told(1.0, 2.0, sd=1.0))):
         groups = {name: found.group[where.start] for name, (where, _) in found.tolerated.items()}
         assert groups.pop(late) == -1
-        assert set(groups.values()) == {found.groups.index(PLATES)}
+        assert set(groups.values()) == {found.groups.index(Care.PLATES)}
 
 
 def test_a_tolerance_is_the_same_in_plates_and_observations() -> None:

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import UNLIKE, ChannelEffect, Effect, Parameter
+from biodance.effects._base.effect import UNLIKE, Care, ChannelEffect, Effect, Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.named_cause import NamedCause
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
@@ -27,6 +27,7 @@ from biodance.spatial import wrench_about_origin, wrench_about_point
 __all__ = [
     "UNLIKE",
     "About",
+    "Care",
     "Case",
     "Cause",
     "CauseWords",

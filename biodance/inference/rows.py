@@ -18,7 +18,7 @@ from biodance.diagnosis.candidates import Candidate, removed, slopes
 from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import Case, Effect
+from biodance.effects import Care, Case, Effect, effects
 from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
@@ -26,12 +26,10 @@ from biodance.uncertainty.tolerances import Tolerances, between_laboratories, ke
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
-BODY, FIXED, PLACED, PLATES, TOLERATED = "body", "fixed", "placed", "plates", "tolerances"
+BODY, FIXED = "body", "fixed"
 """Groups of columns: the parameters of the body; errors that several observations share, and causes whose tolerance is
-their spread between real laboratories (`between_laboratories`), which have no scale; where joints and markers lie;
-the plates; causes within other tolerances. Who places markers with care has no better plates."""
-CARE = (PLACED, PLATES, TOLERATED)
-"""Groups of causes within tolerances: in each of them a laboratory is careful in all, or in none."""
+their spread between real laboratories (`between_laboratories`), which have no scale. Causes within other tolerances are
+grouped by the care of the laboratory that they go with (`Effect.care`)."""
 SOFT = ("slide", "flesh", "sag", "tilt", FilterMismatch.name)
 """Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
 
@@ -204,15 +202,16 @@ def rows_of(
     """
     seen = None if evidence is None or not evidence.counting.observations else evidence.counting
     tolerated = tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
+    care = {name: one.care for name, one in effects().items()}
     if problem is None:
         X, y = np.zeros((0, len(tolerated))), np.zeros(0)
-        names = [_group(key_of(*one.names)) for one in tolerated]
+        names = [_group(key_of(*one.names), care) for one in tolerated]
         units: _Units = {
             one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
             for k, one in enumerate(tolerated)
         }
     else:
-        X, y, names, units = _simulated(problem, tolerated, tolerances)
+        X, y, names, units = _simulated(problem, tolerated, tolerances, care)
     reach = np.empty(0)
     if seen is not None:
         reach = np.ones(len(seen.observations)) if everywhere else seen.in_reach.astype(float)
@@ -233,7 +232,7 @@ def rows_of(
 
 
 def _simulated(
-    problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances
+    problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances, care: Mapping[str, Care]
 ) -> tuple[Array, Array, list[str], _Units]:
     """Return columns, target and groups of the simulated rows, and `Rows.tolerated`."""
     known, keys = nuisances(problem, tolerated), marker_keys(problem)
@@ -249,7 +248,7 @@ def _simulated(
     units = {
         name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
     }
-    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key) for key in known.keys], units
+    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key, care) for key in known.keys], units
 
 
 def _with_observations(
@@ -271,18 +270,14 @@ def _with_observations(
     return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[FIXED] * shared.shape[1]]
 
 
-def _group(key: str) -> str:
+def _group(key: str, care: Mapping[str, Care]) -> str:
     """Return the group of a key: what is alike in kind is as large, or as small, together; what was learned between
     laboratories holds in this one as it is.
     """
     if key in between_laboratories():
         return FIXED
     kind = key.removeprefix("habit ").split()[0]
-    if kind in SOFT:
-        return kind
-    if kind.startswith("plate_"):
-        return PLATES
-    return PLACED if kind in ("joint_centre", "segment_length", "marker_misplaced") else TOLERATED
+    return kind if kind in SOFT else care.get(kind, Care.OTHER)
 
 
 def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:

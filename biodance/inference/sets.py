@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, log_priors
-from biodance.effects import Effect, NamedCause
+from biodance.effects import Care, Effect, NamedCause
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
-from biodance.inference.rows import CARE, Rows
+from biodance.inference.rows import Rows
 from biodance.inference.scales import (
     CONVERGED,
     TAIL,
@@ -268,7 +268,7 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
     its tolerances grew, with these as large as anywhere, so that no fault hides in its own tolerance.
     """
     found = {(s.effect.name, s.effect.target): s for s in _scored(search, one)}
-    scales, tolerated = one.fit.scales, np.isin(search.rows.groups, CARE)
+    scales, tolerated = one.fit.scales, np.isin(search.rows.groups, list(Care))
     if np.any(scales.groups[tolerated] > _GROWN):
         usual = at_scales(search, one, replace(scales, groups=np.where(tolerated, 0.0, scales.groups)))
         # Both gains count from `one`: the loss of evidence by the usual scales is charged.

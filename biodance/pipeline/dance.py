@@ -185,33 +185,6 @@ class DanceResult:
         """What was left out or corrected for this person, or because a move was impossible, in sentences."""
         return (*self.notes, *(self.dance.notes if self.dance else ()))
 
-    def about(self, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
-        """Return what stands before the cues, in the language that ``say`` and ``number`` speak: for whom, the reason
-        of the person's own limits, how safe.
-        """
-        out = [say("For %(whom)s.", whom=say(self.plan.whom))] if self.plan.whom else []
-        if self.dance and (alone := longest_alone(self.dance)):
-            out.append(say("One foot is off the ground for up to %(seconds)s s at a time.", seconds=number(alone, 0)))
-        if self.dance:
-            out.append(plate_sentence(self.dance, say, number))
-        if self.reason_of_person:
-            out.append(say("Made for one person's limits: %(reason)s.", reason=self.reason_of_person))
-        if found := self._left:
-            kept = [
-                say("%(size)s cm of %(what)s", size=number(100 * worst, 1), what=say(one.words)) for one, worst in found
-            ]
-            out.append(
-                say(
-                    "Copied badly by %(count)s simulated people (seven degrees off in every joint, a fifth off in "
-                    "time, swaying), it keeps %(kept)s at the worst moment.",
-                    count=number(PERFORMER_COUNT, 0),
-                    kept=", ".join(kept),
-                )
-            )
-        else:
-            out.append(say("Nobody imprecise was tried on this dance: it is for trained people only."))
-        return tuple(out)
-
     @property
     def complete(self) -> bool:
         """True where nothing of the protocol was left out, neither for the person nor because a move was impossible,
@@ -223,6 +196,34 @@ class DanceResult:
             and not broken(self.margins)
             and (np.isfinite(self.plan.budget) or counted == self.plan.count)
         )
+
+
+def before_cues(result: DanceResult, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
+    """Return what stands before the cues, in the language that ``say`` and ``number`` speak: for whom, the reason
+    of the person's own limits, how safe.
+    """
+    out = [say("For %(whom)s.", whom=say(result.plan.whom))] if result.plan.whom else []
+    if result.dance and (alone := longest_alone(result.dance)):
+        out.append(say("One foot is off the ground for up to %(seconds)s s at a time.", seconds=number(alone, 0)))
+    if result.dance:
+        out.append(plate_sentence(result.dance, say, number))
+    if result.reason_of_person:
+        out.append(say("Made for one person's limits: %(reason)s.", reason=result.reason_of_person))
+    if found := result._left:
+        kept = [
+            say("%(size)s cm of %(what)s", size=number(100 * worst, 1), what=say(one.words)) for one, worst in found
+        ]
+        out.append(
+            say(
+                "Copied badly by %(count)s simulated people (seven degrees off in every joint, a fifth off in "
+                "time, swaying), it keeps %(kept)s at the worst moment.",
+                count=number(PERFORMER_COUNT, 0),
+                kept=", ".join(kept),
+            )
+        )
+    else:
+        out.append(say("Nobody imprecise was tried on this dance: it is for trained people only."))
+    return tuple(out)
 
 
 def _names(segments: tuple[str, ...]) -> str:

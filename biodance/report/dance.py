@@ -17,7 +17,7 @@ from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.plain_text import for_spreadsheet
-from biodance.pipeline.dance import DanceResult, not_safe
+from biodance.pipeline.dance import DanceResult, before_cues, not_safe
 from biodance.pipeline.preview import held_postures, preview_markers, preview_parameters, setpoints
 from biodance.pipeline.still import posture_still, silhouettes
 from biodance.records import Array
@@ -87,7 +87,7 @@ def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:
         minutes=words.count("about %(number)s minute", "about %(number)s minutes", max(1, round(dance.duration / 60))),
         move=words.short(float(np.median(dance.move))),
         hold=words.short(float(np.max(dance.hold))),
-        about=result.about(say, words.number),
+        about=before_cues(result, say, words.number),
         care=[say(one) for one in dance.care],
         unsafe=not_safe(dance),
         cues=cues,
@@ -241,7 +241,7 @@ def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Pa
         tuple(say(stance_words(s)) for s in dance.stances),
         tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
         names=tuple(posture_said(name, say) for name in dance.names),
-        about=(*not_safe(dance), *(say(one) for one in dance.care), *result.about(say, words.number)),
+        about=(*not_safe(dance), *(say(one) for one in dance.care), *before_cues(result, say, words.number)),
         rests=rests(dance),
         say=say,
         short=words.short,

@@ -15,6 +15,7 @@ size by themselves). Causes that are found by a check instead of a fit (units, l
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
@@ -29,6 +30,15 @@ UNLIKE = 0.07
 """Share of its size by which every cause is unlike its model: derivatives at the samples that are looked at are no
 better at the upper edge of the bands.
 """
+
+
+class Care(StrEnum):
+    """What a laboratory is careful in: of the causes within tolerances that go with one care, all are small together.
+    Who places markers with care has no better plates.
+    """
+
+    PLATES = "plates"
+    OTHER = "tolerances"
 
 
 @dataclass(frozen=True)
@@ -78,6 +88,8 @@ class Effect(Checked):
     prior: ClassVar[float] = 0.01
     """Probability that a session has it, before any data, at whichever target: judgement, told by how often
     laboratories find it."""
+    care: ClassVar[Care] = Care.OTHER
+    """With what care of a laboratory it is small, as long as it is no fault."""
     by_load: ClassVar[bool] = False
     """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
     screened_at: ClassVar[tuple[float, ...]] = ()
@@ -225,6 +237,8 @@ class Effect(Checked):
 
 class ChannelEffect(Effect, ABC):
     """A cause in one channel of a plate: ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
+
+    care = Care.PLATES
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect
+from biodance.effects._base.effect import Care, Effect
 from biodance.lab.plates.faults import PlateFault
 from biodance.records import Array
 from biodance.spatial import wrench_about_origin
@@ -15,6 +15,7 @@ from biodance.spatial import wrench_about_origin
 class InstalledPlate(Effect, ABC):
     """A plate that reads ``fault.mixing`` times what is there; the author writes the ``fault``."""
 
+    care = Care.PLATES
     fault: ClassVar[PlateFault]
 
     @property
