@@ -241,8 +241,13 @@ def test_an_exchange_of_some_frames_is_put_right_in_a_copy_and_nothing_else(data
     np.testing.assert_array_equal(after.points[:70, left], before.points[:70, left])
     again = write_exchanged(wrong, tmp_path / "right.c3d", {("LKNE", "RKNE"): [(70, 120)]})
     assert again.read_bytes() == source.read_bytes()
+
+
+def test_a_label_that_no_point_has_is_refused_and_nothing_is_written(data: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "none.c3d"
     with pytest.raises(FileRefused, match="holds no point LXXX"):
-        write_exchanged(source, tmp_path / "none.c3d", {("LXXX", "RKNE"): [(0, 5)]})
+        write_exchanged(data / "biomechzoo/HC032A/HC032A03.c3d", copy, {("LXXX", "RKNE"): [(0, 5)]})
+    assert not copy.exists()
 
 
 @pytest.mark.parametrize("child", ["HC002D", "HC036A"])
