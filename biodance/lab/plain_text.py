@@ -8,12 +8,15 @@ import math
 import os
 import re
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
+from biodance.records import Array
 
 _LARGEST = 2**31  # Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB
 LARGEST_NUMBER = 1e12
@@ -205,3 +208,31 @@ def parse_number(cell: str, where: str) -> float:
             f"again."
         )
     return value if math.isfinite(value) else math.nan
+
+
+_BLANKS = re.compile(r" *([\t\n]) *")
+_EMPTY = re.compile(r"(?<![^\t\n])(?![^\t\n])")  # Between two tabs or ends of line: no sign before, none behind
+
+
+def plain_table(lines: Sequence[str], width: int) -> Array | None:
+    """Return the numbers (T, ``width``) of lines all at once, cells as of `cells`, numbers as of `parse_number`; None
+    where a line has other cells or one is odd: then it is for the reader to look at the lines one by one.
+    """
+    text = "\n".join(lines)
+    tabs = "\t" in text
+    rows = _BLANKS.sub(r"\1", text).strip(" ").split("\n") if tabs and " " in text else text.split("\n")
+    if tabs and {row.count("\t") for row in rows} == {width}:  # one more behind the last cell
+        rows = [row.removesuffix("\t") for row in rows]
+    text = "\n".join(rows)
+    # `float` knows more than `parse_number`: 1_0, digits of other scripts.
+    odd = not text.isascii() or "_" in text or (tabs and " " in text)
+    if odd or {row.count("\t") + 1 if tabs else len(row.split()) for row in rows} != {width}:
+        return None
+    numbers = text.split()
+    if len(numbers) < width * len(rows):
+        numbers = _EMPTY.sub("nan", text).split()
+    try:
+        values = np.fromiter(map(float, numbers), float, len(numbers)).reshape(len(rows), width)
+    except ValueError:
+        return None
+    return None if (np.abs(values) > LARGEST_NUMBER).any() else values

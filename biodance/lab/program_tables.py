@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, known_index
-from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_whole
+from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, plain_table, read_text, with_points, write_whole
 from biodance.records import Array, Wrench, assign, freeze, frozen_array
 from biodance.records.arrays import rate_of
 from biodance.settings import COP_FORCE
@@ -71,7 +71,9 @@ def read_mot(path: str | Path) -> TimeTable:
     header, labels, body, vectors, history = _parts(path)
     if not body:
         raise FileRefused(f"{path}: holds no row of numbers. Export it again.")
-    table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
+    table = plain_table([row for _, row in body], len(labels))
+    if table is None:
+        table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
     time = table[:, 0]
     if np.isnan(time).any() or np.any(np.diff(time) <= 0):
         at = int(np.argmax(np.isnan(time))) if np.isnan(time).any() else int(np.argmax(np.diff(time) <= 0)) + 1

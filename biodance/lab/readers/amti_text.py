@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.plain_text import COMMAS_READ, parse_number, read_bytes, read_text, sha256, with_points
+from biodance.lab.plain_text import COMMAS_READ, parse_number, plain_table, read_bytes, read_text, sha256, with_points
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.decode import DEEPEST, find_baseline, loaded_samples
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
@@ -36,7 +36,7 @@ def sniff(head: bytes) -> bool:
 
 
 _KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
-_CHANNELS = 6  # a line with all numbers of a row but one is a damaged row and no header
+_CHANNELS = 6
 _EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
 
 
@@ -65,30 +65,45 @@ def _settings(header: list[str], values: Array, path: Path) -> tuple[dict[str, A
 
 def _table(text: str, path: Path) -> tuple[list[str], Array]:
     """Return the cells of the last line before the numbers (header, maybe empty) and the numbers (S, C)."""
-    header: list[str] = []
+    lines, header, first, begin = text.splitlines(), list[str](), list[str](), 0
+    for line in lines:
+        first = _cells(line)
+        # All numbers of a row but one are a damaged row and no header.
+        if first and sum(_numbers([cell]) is not None for cell in first) >= min(_CHANNELS - 1, len(first)):
+            break
+        header, first, begin = first or header, [], begin + 1
+    # Commas and semicolons part cells as tabs do.
+    rest = "\n".join(filter(str.strip, lines[begin:])).replace(",", "\t").replace(";", "\t")
+    values = plain_table(rest.split("\n"), len(first)) if first else np.empty((0, 0))
+    if values is None or not np.isfinite(values).all():
+        values = _row_by_row(lines, begin, path)
+    if len(values) < 2 or len(first) < 6:
+        raise FileRefused(
+            f"{path}: holds {len(values)} rows of {len(first)} numbers; a plate needs at least 2 rows of 6. Check the "
+            f"file."
+        )
+    return header, values
+
+
+def _row_by_row(lines: list[str], begin: int, path: Path) -> Array:
+    """Return the numbers (S, C) in the lines from ``begin`` on; the first line that is no row of them is refused."""
     rows: list[list[float]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        cells = [c.strip() for c in re.split(r"[,;\t]" if re.search(r"[,;\t]", line) else r"\s+", line.strip())]
-        cells = cells[:-1] if cells and not cells[-1] else cells
-        if not cells:
-            continue
-        row = _numbers(cells)
-        if row is None and not rows and sum(_numbers([cell]) is not None for cell in cells) < _CHANNELS - 1:
-            header = cells
-        elif row is None or (rows and len(row) != len(rows[0])):
+    for number, line in enumerate(lines[begin:], start=begin + 1):
+        row = _numbers(found) if (found := _cells(line)) else []
+        if row is None or (row and rows and len(row) != len(rows[0])):
             expected = f"{len(rows[0])} numbers" if rows else "numbers"
             raise FileRefused(
                 f"{path}, line {number}: {line.strip()[:60]!r} is not a row of {expected}. Correct or export the file "
                 f"again."
             )
-        else:
-            rows.append(row)
-    if len(rows) < 2 or len(rows[0]) < 6:
-        raise FileRefused(
-            f"{path}: holds {len(rows)} rows of {len(rows[0]) if rows else 0} numbers; a plate needs at least 2 rows "
-            f"of 6. Check the file."
-        )
-    return header, np.array(rows)
+        rows += [row] * bool(row)
+    return np.array(rows)
+
+
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line; a separator at its end parts nothing."""
+    found = [c.strip() for c in re.split(r"[,;\t]" if re.search(r"[,;\t]", line) else r"\s+", line.strip())]
+    return found if found[-1] else found[:-1]
 
 
 def _numbers(cells: list[str]) -> list[float] | None:

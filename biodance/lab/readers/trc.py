@@ -19,6 +19,7 @@ from biodance.lab.plain_text import (
     cells,
     decode,
     parse_number,
+    plain_table,
     read_bytes,
     sha256,
     with_points,
@@ -30,6 +31,7 @@ from biodance.lab.readers.mot import has_plates, plates_of
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _HEADER_ROWS = 4
+_FRAME = re.compile(r"\s*\d+(\.0*)?(\s|$)")  # A row that begins with the number of a frame
 _WIDEST = 50.0  # m, between the markers of one frame
 _NARROWEST = 0.05  # m, the same of a hand
 _FEW = 4  # markers, fewer of which may lie anywhere
@@ -256,6 +258,20 @@ def _labels(rows: list[str], path: Path) -> tuple[list[str], list[str]]:
 
 def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], Array, Array, list[str]]:
     """Return frame numbers (T,), times (T,) s, coordinates (T, K, 3) in file units, and which rows are short."""
+    # One or two rows behind the labels may number the axes, or hold nothing.
+    begin = next((k for k in range(_HEADER_ROWS, _HEADER_ROWS + 3) if _FRAME.match("".join(rows[k : k + 1]))), 0)
+    frames, short = list(filter(str.strip, rows[begin:])), list[int]()
+    array = plain_table(frames, 2 + 3 * count) if all(map(_FRAME.match, frames)) else None
+    if array is None:
+        array, short = _row_by_row(rows, count, path)
+    said = (
+        [f"{len(short)} rows are short (first: row {short[0]}): their last markers count as not seen."] if short else []
+    )
+    return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(array), count, 3), said
+
+
+def _row_by_row(rows: list[str], count: int, path: Path) -> tuple[Array, list[int]]:
+    """Return all cells (T, 2 + 3 K) and which rows are short; the first row that cannot be one is refused."""
     width, short = 2 + 3 * count, list[int]()
     table: list[list[float]] = []
     for line_number, line in enumerate(rows[_HEADER_ROWS:], start=_HEADER_ROWS + 1):
@@ -280,11 +296,7 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
         table.append([parse_number(cell, f"{path}, row {line_number}") for cell in found])
     if not table:
         raise FileRefused(f"{path}: holds a header but no frame. Export the recording again.")
-    array = np.array(table)
-    said = (
-        [f"{len(short)} rows are short (first: row {short[0]}): their last markers count as not seen."] if short else []
-    )
-    return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(table), count, 3), said
+    return np.array(table), short
 
 
 def _equal_steps(

@@ -10,7 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, SessionRefused
-from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_bytes, read_text, sha256, with_points
+from biodance.lab.plain_text import (
+    COMMAS_READ,
+    cells,
+    parse_number,
+    plain_table,
+    read_bytes,
+    read_text,
+    sha256,
+    with_points,
+)
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
@@ -130,12 +139,10 @@ def read_plate_text(path: Path) -> Trial:
             f"{path}: its header does not name {', '.join(lacking)}. Write a first line such as Time[s], Fx[N], Fy[N], "
             f"Fz[N], Mx[Nm], My[Nm], Mz[Nm]."
         )
-    raw = np.array(
-        [
-            [parse_number(cell, f"{path}, line {k}") for cell in _cells(line)]
-            for k, line in enumerate(lines[1:], start=2)
-        ]
-    )
+    raw = plain_table(lines[1:], len(_cells(lines[0])))
+    if raw is None:
+        rows = ((f"{path}, line {k}", _cells(line)) for k, line in enumerate(lines[1:], start=2))
+        raw = np.array([[parse_number(cell, where) for cell in row] for where, row in rows])
     time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
     wrench = np.column_stack(value)
     sign = -1.0 if wrench[:, 2].mean() < 0 else 1.0
