@@ -17,9 +17,9 @@ from scipy.stats import t as student
 from biodance.cli import run
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
-from biodance.cycles.keys import key_values, leading_foot, stride_values
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import Stride
+from biodance.cycles.summary import key_values, leading_foot, stride_values
 from biodance.errors import SessionRefused
 from biodance.pipeline import visits as pipeline
 from biodance.pipeline.movement import SessionMovement

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biodance.cycles.lifts import jumps, lift
+from biodance.cycles.cut import jumps
+from biodance.cycles.strides import lift
 from biodance.records import Wrench
 
 RATE, WEIGHT, G = 100.0, 600.0, 9.81

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.cycles.cut import Cycle
-from biodance.cycles.lifts import lift
+from biodance.cycles.strides import lift
 from biodance.records import Wrench
 
 TIME = np.linspace(0, 4, 401)

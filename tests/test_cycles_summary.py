@@ -9,9 +9,8 @@ from made_cycles import curve, cycle, trial
 from biodance.body.human.human import human
 from biodance.cycles.curves import CycleCurve, ground_curves
 from biodance.cycles.cut import Cycle
-from biodance.cycles.keys import key_values
 from biodance.cycles.strides import Stride
-from biodance.cycles.summary import LeftOutBecause, repetitions_of, symmetry_index
+from biodance.cycles.summary import LeftOutBecause, key_values, repetitions_of, symmetry_index
 from biodance.motion.soles import soles_from_body
 from biodance.records import Motion, Subject, Wrench
 

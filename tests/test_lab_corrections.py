@@ -10,7 +10,7 @@ from plate_trials import CENTRE, CORNERS, FORCE, POINT, TIME, trial
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d.write import write_trial
-from biodance.lab.corrections import (
+from biodance.lab.plates.faults import (
     PlateCorrection,
     corrected_session,
     corrected_trial,

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from biodance.cycles.beside import emg_curves
 from biodance.cycles.cut import Cycle
-from biodance.lab.c3d.emg import emg_envelopes, muscle_of
-from biodance.lab.c3d.subject import FileOutputs
+from biodance.cycles.movement import emg_curves
+from biodance.lab.c3d.subject import FileOutputs, emg_envelopes, muscle_of
 
 RATE = 1000.0
 TIME = np.arange(0, 4, 1 / RATE)

@@ -14,7 +14,7 @@ from biodance.lab.inspect import inspect_file
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.plates.corners import Told, ToldPlate
 from biodance.lab.readers import read_trial, reader_of
-from biodance.lab.readers._table_forces import Load, table_plates
+from biodance.lab.readers.table import Load, table_plates
 from biodance.lab.session.write import init_session
 
 EVEN = 0.2 + np.arange(100) / 60

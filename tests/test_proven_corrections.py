@@ -22,8 +22,7 @@ from biodance.effects.axis_error import moment_point
 from biodance.identification.identification import identify_body
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import validate
-from biodance.lab.corrections import PlateCorrection, corrected_trial, correction_doubts
-from biodance.lab.plates.faults import OFFSET
+from biodance.lab.plates.faults import OFFSET, PlateCorrection, corrected_trial, correction_doubts
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline import diagnosis
 from biodance.pipeline.accepted import proven

@@ -18,8 +18,8 @@ from biodance.body.body import body_text, read_body
 from biodance.cli.shared import say
 from biodance.dance.dance import Dance
 from biodance.errors import FileRefused, without_codes
-from biodance.lab.corrections import read_corrections
 from biodance.lab.plain_text import for_spreadsheet
+from biodance.lab.plates.faults import read_corrections
 from biodance.lab.robot import read_encoders
 from biodance.lab.session.results_folder import read_manifest
 from biodance.library import read_toml

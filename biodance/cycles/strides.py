@@ -1,5 +1,6 @@
-"""The spatio-temporal values of walking and running: cadence, speed, lengths and times of steps, contact and flight,
-margin of stability, vertical stiffness.
+"""The values of every repetition: of walking and running cadence, speed, lengths and times of steps, contact and
+flight, margin of stability, vertical stiffness; of a squat, a rise or a jump how deep and high, how much on which foot,
+how fast.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.cycles.cut import Cycle, heel_and_toe
 from biodance.motion.soles import Soles
-from biodance.records import SIDES, Array, FootEvent
+from biodance.records import SIDES, Array, FootEvent, Mask, Wrench
 from biodance.settings import STANDARD_GRAVITY
 
 _BELT = 0.15  # m/s of a standing foot from which the ground is a belt
@@ -176,3 +177,57 @@ def _values(
 def place_at(path: Array, time: Array, when: float) -> Array:
     """Return the place (k,) at an instant s of a path (T, k)."""
     return np.array([np.interp(when, time, column) for column in path.T])
+
+
+LIFT_UNITS: Mapping[str, str] = {
+    "duration": "s",
+    "depth": "m",
+    "height": "m",
+    "flight_time": "s",
+    "share_right": "%",
+    "force_rise": "%/s",
+}
+"""Quantity of a squat, a rise or a jump -> unit."""
+_OVER = 0.1
+"""s over which the force rises that its rate is told of: one of the windows of Maffiuletti et al. 2016,
+doi:10.1007/s00421-016-3346-6.
+"""
+
+
+def lift(
+    cycle: Cycle,
+    centre: Array,
+    time: Array,
+    weight: float,
+    feet: Mapping[str, Wrench] | None,
+    sure: Mask,
+    whole: Mask | None = None,
+) -> Stride:
+    """Return the values of one squat, rise or jump.
+
+    ``depth`` by how much the ``centre`` (T, 3) m of mass goes down and comes up again, the smaller of both for a squat,
+    the way up for a rise, the way down for a jump; ``height`` by how much it rises after a take-off, ``flight_time``
+    until the landing. ``share_right`` of the vertical force while the feet push (of a jump until take-off);
+    ``force_rise`` the fastest rise of the force of both feet over `_OVER` s, % of the ``weight`` N per s. Shares where
+    both ``feet`` are known, each on a plate of its own (``sure`` (T,)), the rise where their sum is (``whole`` (T,), by
+    default the same), throughout.
+    """
+    jump = cycle.kind == "jump"
+    inside = (time >= cycle.start) & (time <= (cycle.off if jump else cycle.end))
+    height, whole = centre[inside, 2], sure if whole is None else whole
+    down, up = height[0] - height.min(), height[-1] - height.min()
+    depth = {"squat": min(down, up), "sit_to_stand": up, "jump": down}[cycle.kind]
+    values = {"duration": cycle.duration, "depth": float(depth)}
+    if jump:
+        flies = (time >= cycle.off) & (time <= cycle.end)
+        left = float(np.interp(cycle.off, time, centre[:, 2]))
+        values |= {"height": float(centre[flies, 2].max()) - left, "flight_time": cycle.end - cycle.off}
+    if feet is not None and whole[inside].all():
+        right, left_foot = (feet[f"{side}_foot"].force[inside, 2] for side in SIDES)
+        total, at = right + left_foot, time[inside]
+        later = np.minimum(at + _OVER, at[-1])
+        if sure[inside].all():
+            values["share_right"] = float(100 * right.sum() / total.sum())
+        # Largest gain over `_OVER` s from any instant; near the end the window is shorter, its divisor is not.
+        values["force_rise"] = float(100 * ((np.interp(later, at, total) - total) / _OVER).max() / weight)
+    return Stride(cycle, values)

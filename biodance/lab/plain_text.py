@@ -4,12 +4,14 @@ ends, decimal points or commas; and write files where none are yet.
 
 import codecs
 import hashlib
+import io
 import math
 import os
 import re
 import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +27,8 @@ _TEXT_LOOKS_BINARY = b"\x00"
 _PRESENT = "{}: exists already and is not overwritten. Choose another name or remove it."
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return the bytes of a file.
+def read_bytes(path: Path, *, most: int = -1) -> bytes:
+    """Return the bytes of a file, of which ``most`` are wanted (-1 = all).
 
     Raises
     ------
@@ -34,9 +36,11 @@ def read_bytes(path: Path) -> bytes:
         There is no such file, it is a pipe or device or too large, it cannot be opened, or it is empty.
     """
     refuse_special(path)
-    refuse_huge(path)
+    if most < 0:
+        refuse_huge(path)
     try:
-        content = path.read_bytes()
+        with path.open("rb") as stream:
+            content = stream.read(most)
     except OSError as error:
         raise FileRefused(
             f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights."
@@ -236,3 +240,160 @@ def plain_table(lines: Sequence[str], width: int) -> Array | None:
     except ValueError:
         return None
     return None if (np.abs(values) > LARGEST_NUMBER).any() else values
+
+
+_QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
+_HEADER_ROWS = 30
+_PARQUET = b"PAR1"
+_UNIT = re.compile(r"^(.*?)[\s_]*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """``labels``, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty; ``said`` how read."""
+
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    said: tuple[str, ...] = ()
+
+
+def is_parquet(content: bytes) -> bool:
+    """Return whether bytes begin as those of a Parquet file."""
+    return content.startswith(_PARQUET)
+
+
+def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:
+    """Return the cells of a table of ``least`` columns or more in a file's ``content``.
+
+    Raises
+    ------
+    FileRefused
+        No row of labels, rows of the wrong length, a cell that is no number, a Parquet file that is damaged or cannot
+        be read for want of pyarrow.
+    """
+    return _of_parquet(content, path) if is_parquet(content) else _of_text(decode(content, path), path, least)
+
+
+def header_of(text: str, *, least: int = 4) -> tuple[int, str, tuple[str, ...]] | None:
+    """Return row (from 0), separator and cells of the labels: the first row of >= ``least`` cells, most no numbers."""
+    for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
+        for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
+            found = tuple(cell.strip() for cell in line.split(separator))
+            words = sum(not _NUMBER.fullmatch(cell) for cell in found)
+            if len(found) >= least and 2 * words > len(found):
+                return row, separator, found
+    return None
+
+
+def clean_label(cell: str) -> tuple[str, str]:
+    """Return label and unit of a cell such as ``"LASI x (mm)"`` or ``’time'``, without quotes; "" = no unit."""
+    plain = cell.strip().strip(_QUOTES + " ")
+    tuple_like = re.fullmatch(r"\((.*)\)", plain)  # several rows of labels, as pandas writes them
+    if tuple_like and "," in plain:
+        return "_".join(part.strip().strip(_QUOTES) for part in tuple_like[1].split(",")), ""
+    unit = _UNIT.fullmatch(plain)
+    return (unit[1].strip(), unit[2]) if unit and unit[1] else (plain, "")
+
+
+def _of_text(text: str, path: Path, least: int) -> Cells:
+    header = header_of(text, least=least)
+    if header is None:
+        raise FileRefused(f"{path}: no row holds the labels of columns. Write them into the first row, as LASI_x.")
+    row, separator, found = header
+    lines = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
+    body = [(number, line) for number, line in lines if number > row + 1]
+    labels, units = (list(some) for some in zip(*map(clean_label, found), strict=True))
+    if body and not any(_NUMBER.fullmatch(cell.strip()) and cell.strip() for cell in body[0][1].split(separator)):
+        below = [clean_label(f"x ({cell.strip()})")[1].strip("()[]") for cell in body[0][1].split(separator)]
+        units = [unit or said for unit, said in zip(units, [*below, *[""] * len(units)], strict=False)]
+        body = body[1:]
+    commas = separator != "," and any("," in line for _, line in body) and not any("." in line for _, line in body)
+    said = [f"Columns are parted by {_SEPARATORS[separator]}.", *[COMMAS_READ] * commas]
+    body, cut = _whole_rows(body, separator, len(labels), path)
+    values = _numbers(body, separator, len(labels), commas=commas, path=path)
+    return Cells(tuple(labels), tuple(units), values, (*said, *cut))
+
+
+def _whole_rows(
+    body: list[tuple[int, str]], separator: str, width: int, path: Path
+) -> tuple[list[tuple[int, str]], list[str]]:
+    """Return the rows of ``width`` cells; only the last may be cut off, which is said."""
+    if not body:
+        raise FileRefused(f"{path}: holds labels and no row of numbers. Export it again.")
+    cut: list[str] = []
+    if len(body) > 1 and body[-1][1].count(separator) + 1 < width:
+        cut = [f"The last row ({body[-1][0]}) is cut off and was left out."]
+        body = body[:-1]
+    for number, line in body:
+        count = (
+            len(line.rstrip(separator).split(separator))
+            if line.count(separator) >= width
+            else line.count(separator) + 1
+        )
+        if count > width or line.count(separator) + 1 < width:
+            raise FileRefused(
+                f"{path}: row {number} holds {count} cells, {width} are expected. Correct it or export it again."
+            )
+    return body, cut
+
+
+def _numbers(body: list[tuple[int, str]], separator: str, width: int, *, commas: bool, path: Path) -> Array:
+    import pandas as pd
+
+    text = "\n".join(line for _, line in body)
+    try:
+        table = pd.read_csv(
+            io.StringIO(text),
+            sep=separator,
+            header=None,
+            decimal="," if commas else ".",
+            usecols=range(width),
+            skipinitialspace=True,
+            low_memory=False,
+        )
+    except pd.errors.ParserError as error:
+        raise FileRefused(
+            f"{path}: a quotation mark is opened and never closed among the numbers. Take it out or export the file "
+            f"again."
+        ) from error
+    for column in range(width):
+        if not pd.api.types.is_numeric_dtype(table[column]):
+            wrong = pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()
+            at = int(np.argmax(wrong)) if wrong.any() else 0
+            raise FileRefused(
+                f"{path}: row {body[at][0]}, column {column + 1}: {table[column][at]!r} is not a number. Correct that "
+                f"cell or export the file again."
+            )
+    return table.to_numpy(dtype=float)
+
+
+def _of_parquet(content: bytes, path: Path) -> Cells:
+    import pandas as pd
+
+    try:
+        table = pd.read_parquet(io.BytesIO(content))
+    except ImportError as error:
+        raise FileRefused(
+            f"{path}: reading Parquet needs pyarrow. Install it (pip install pyarrow), or export the table as CSV."
+        ) from error
+    except Exception as error:
+        raise FileRefused(f"{path}: is a damaged Parquet file ({error}). Export it again.") from error
+    index = [] if isinstance(table.index, pd.RangeIndex) else [table.index.to_numpy()]
+    names = [str(table.index.name or "index")] * len(index) + [str(name) for name in table.columns]
+    columns = [*index, *(table[name].to_numpy() for name in table.columns)]
+    kept = [(name, column) for name, column in zip(names, columns, strict=True) if column.dtype.kind in "iufmM"]
+    labels, units = zip(*(clean_label(name) for name, _ in kept), strict=True) if kept else ((), ())
+    values = [
+        np.where(
+            np.isnat(c),
+            np.nan,
+            c.astype("timedelta64[ns]" if c.dtype.kind == "m" else "datetime64[ns]").astype("int64") / 1e9,
+        )
+        if c.dtype.kind in "mM"
+        else c.astype(float)
+        for _, c in kept
+    ]
+    return Cells(labels, units, np.stack(values, axis=1) if values else np.empty((0, 0)), ("Read from Parquet.",))

@@ -10,9 +10,8 @@ from typing import Any, cast
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, SessionRefused, refuse_unknown
-from biodance.lab.plain_text import read_bytes
+from biodance.lab.plain_text import read_bytes, read_cells
 from biodance.lab.readers import read_head, read_trial, sniffed
-from biodance.lab.readers.table import read_cells
 from biodance.library import read_toml
 from biodance.records import ROLES, Array, Markers, Role, Wrench
 from biodance.records.motion import Encoders
@@ -54,7 +53,11 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         )
     time = values[:, clock]
     _check_clock(path, time)
-    factors = np.array([_factor(path, names[i], cells.units[i] or unit) for i in columns])
+    words = {names[i]: (cells.units[i] or unit).lower().rstrip(".") for i in columns}
+    for name, word in words.items():
+        if word not in _UNITS:
+            raise FileRefused(f"{path}: the unit of column {name} is {word!r}; legal are rad and deg.")
+    factors = np.array([_UNITS[words[names[i]]] for i in columns])
     joints = tuple(names[i] for i in columns)
     twice = sorted({name for name in joints if joints.count(name) > 1})
     if twice:
@@ -67,13 +70,6 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         first = f"Samples are missing after {time[late[0]]:.3f} s{others}"
         notes.append(f"{first}: up to {steps.max():.3g} s without one.")
     return Encoders(time, joints, values[:, columns] * factors, tuple(notes))
-
-
-def _factor(path: Path, column: str, unit: str) -> float:
-    word = unit.lower().rstrip(".")
-    if word not in _UNITS:
-        raise FileRefused(f"{path}: the unit of column {column} is {word!r}; legal are rad and deg.")
-    return _UNITS[word]
 
 
 def _check_clock(path: Path, time: Array) -> None:

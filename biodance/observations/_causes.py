@@ -1,7 +1,7 @@
 """What causes do to a recording: plates' records are changed as a wrong file, cable or clock would change them.
 
 Names and parameters are those of the effects (`biodance.effects`). What a fault of a plate does to its wrench is said
-once (`lab.corrections`): observations' sensitivities and the correction of a recording both come from it.
+once (`lab.plates.faults`): observations' sensitivities and the correction of a recording both come from it.
 """
 
 from collections.abc import Mapping, Sequence

@@ -36,8 +36,17 @@ from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
 from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.c3d.write import write_trial
-from biodance.lab.corrections import APPLIED, PlateCorrection, corrected_trial, corrections_text, joined_corrections
-from biodance.lab.plates.faults import DELAY, GAIN, OFFSET, PLATE_FAULTS
+from biodance.lab.plates.faults import (
+    APPLIED,
+    DELAY,
+    GAIN,
+    OFFSET,
+    PLATE_FAULTS,
+    PlateCorrection,
+    corrected_trial,
+    corrections_text,
+    joined_corrections,
+)
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, recorded_of, windows
 from biodance.pipeline.results import MendedCopy, SessionDiagnosis, SessionResult

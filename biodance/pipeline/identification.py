@@ -24,7 +24,7 @@ from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
-from biodance.lab.corrections import PlateCorrection
+from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.motion.newton import QuietStanding
 from biodance.observations import recording

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from biodance.cycles.scores import DeviationReference, NormalCurve, deviation_of, normal_of
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.corrections import (
+from biodance.lab.plates.faults import (
     PlateCorrection,
     corrected_session,
     corrections_text,
@@ -149,7 +149,7 @@ class _Laboratory(_Table):
 
 
 class LabContents(_Table):
-    """The tables of a lab.toml; ``corrections`` are checked where they are made (`lab.corrections`)."""
+    """The tables of a lab.toml; ``corrections`` are checked where they are made (`lab.plates.faults`)."""
 
     laboratory: _Laboratory = _Laboratory()
     corrections: dict[str, Any] = {}

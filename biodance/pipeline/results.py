@@ -20,7 +20,7 @@ from biodance.effects import QualityCheck
 from biodance.effects._base.exchange_spans import Pair, Spans
 from biodance.identification.identification import Identification
 from biodance.inference.decision import Inferred
-from biodance.lab.corrections import PlateCorrection
+from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing

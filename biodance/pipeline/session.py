@@ -12,7 +12,7 @@ from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.limbs import with_declared_limbs
 from biodance.identification.paper_programme import identify_as_paper
-from biodance.lab.corrections import PlateCorrection, corrected_trial
+from biodance.lab.plates.faults import PlateCorrection, corrected_trial
 from biodance.motion.contact import carried_elsewhere
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces

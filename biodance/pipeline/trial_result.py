@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.identification.statistics import Fit
-from biodance.lab.corrections import PlateCorrection, correction_doubts
 from biodance.lab.markers.signals import MarkerGaps
+from biodance.lab.plates.faults import PlateCorrection, correction_doubts
 from biodance.motion.contact import Contact
 from biodance.motion.ik.functional_joints import JointGain
 from biodance.motion.newton import QuietStanding

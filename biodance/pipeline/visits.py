@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 from biodance import display
 from biodance.cycles.curves import CurveGroup, group_curves
-from biodance.cycles.keys import KeyValue, key_values, leading_foot, stride_values
+from biodance.cycles.summary import KeyValue, key_values, leading_foot, stride_values
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.identification.knowledge import SIGMAS, Known
 from biodance.identification.sessions import Difference, differences

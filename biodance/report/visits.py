@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
+from biodance.cycles.summary import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.saved_results import now, provenance
 from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison

@@ -8,7 +8,7 @@ from biodance.body.body import body_text
 from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
-from biodance.lab.corrections import APPLIED, PlateCorrection
+from biodance.lab.plates.faults import APPLIED, PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import corrected_attention, identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis

@@ -1,4 +1,4 @@
-"""A cause in an installed plate whose formula is that of `lab.corrections`: what it adds to the predicted wrench."""
+"""A cause in an installed plate whose formula is that of `lab.plates.faults`: what it adds to the predicted wrench."""
 
 from abc import ABC
 from typing import ClassVar

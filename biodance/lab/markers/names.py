@@ -9,11 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import islice, permutations, product
-from typing import TypeVar
 
 from biodance.lab.markers.sets import LANDMARKS
 from biodance.library import locate, read_toml
-from biodance.records import SIDES
+from biodance.records import SIDES, grouped
 
 _SHARED = 0.8
 """Share of the labels that begin alike before the beginning is taken for the subject's name."""
@@ -135,8 +134,7 @@ def _readings_of(
         ways.append(way)
         out |= {label: tuple(one for one in every[label] if one.way == way) for label in mirrored[way]}
     for label in every.keys() - out.keys():
-        own = tuple(one for one in every[label] if not one.side or not ways or one.way in ways)
-        out[label] = own
+        out[label] = tuple(one for one in every[label] if not one.side or not ways or one.way in ways)
     return {label: out[label] for label in every}
 
 
@@ -188,8 +186,6 @@ _SKIN = ("asis", "psis", "knee_medial", "ankle_medial")
 _PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
 """A number, as an ordinal or not, or a word, within a token."""
 _WAYS = 24  # Ways to cut the tokens of a label into words, beyond which the label says nothing
-_Key = TypeVar("_Key")
-_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -204,10 +200,10 @@ class Meaning:
 class _Vocabulary:
     pairs: tuple[tuple[str, str], ...]
     noise: frozenset[str]
-    landmarks: Mapping[str, tuple[tuple[str, int], ...]]
+    landmarks: Mapping[str, Sequence[tuple[str, int]]]
     segments: Mapping[str, str]
-    words: Mapping[str, tuple[str, ...]]
-    composed: Mapping[frozenset[str], tuple[str, ...]]
+    words: Mapping[str, Sequence[str]]
+    composed: Mapping[frozenset[str], Sequence[str]]
 
 
 @cache
@@ -217,21 +213,13 @@ def _vocabulary() -> _Vocabulary:
     return _Vocabulary(
         pairs=tuple((right, left) for right, left in table["sides"]["pairs"]),
         noise=frozenset(table["noise"]["words"]),
-        landmarks=_gathered(
+        landmarks=grouped(
             (word, (mark, rank)) for mark, some in table["landmarks"].items() for rank, word in enumerate(some)
         ),
         segments={word: segment for segment, some in table["segments"].items() for word in some},
-        words=_gathered((word, kind) for kind, some in kinds.items() for word in some),
-        composed=_gathered((frozenset(way.split()), mark) for mark, some in table["composed"].items() for way in some),
+        words=grouped((word, kind) for kind, some in kinds.items() for word in some),
+        composed=grouped((frozenset(way.split()), mark) for mark, some in table["composed"].items() for way in some),
     )
-
-
-def _gathered(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, tuple[_Value, ...]]:
-    """Return every key with all that stands beside it, in order."""
-    found: dict[_Key, tuple[_Value, ...]] = {}
-    for key, value in pairs:
-        found[key] = (*found.get(key, ()), value)
-    return found
 
 
 def meanings(label: str) -> tuple[Meaning, ...]:

@@ -65,26 +65,12 @@ class Decisions:
 class PlateReading:
     """A plate whose directions are not yet decided.
 
-    Attributes
-    ----------
-    plate : PlateParameters
-        What the file says.
-    corners, axes, half : Array
-        (4, 3) m in the lab frame; lab_R_plate (3, 3); half the sides (2,) m along the plate's x and y.
-    sensor : Array
-        (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero taken off.
-    vector : Array
-        (3,) m from the sensor to the centre of the surface, plate axes, as the file says.
-    rate : float
-        Hz of the samples.
-    empty : Array
-        (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded.
-    known : Array
-        (S,) False where a channel holds no number; ``sensor`` then keeps the nearest known sample, for decisions only.
-    decisions : Decisions
-        What was decided.
-    warnings : tuple of str
-        What a person should look at, beside odd corners, origins and gaps.
+    ``plate`` what the file says; ``corners`` (4, 3) m in the lab frame; ``axes`` lab_R_plate (3, 3); ``half`` the sides
+    (2,) m along the plate's x and y; ``sensor`` (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero
+    taken off; ``vector`` (3,) m from the sensor to the centre of the surface, plate axes, as the file says; ``rate`` Hz
+    of the samples; ``empty`` (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded;
+    ``known`` (S,) False where a channel holds no number: ``sensor`` then keeps the nearest known sample, for decisions
+    only; ``decisions`` what was decided; ``warnings`` what a person should look at, beside odd corners, origins, gaps.
     """
 
     plate: PlateParameters
@@ -114,28 +100,9 @@ def decode_plates(
     not applied where with it the plates carry less than half or more than twice the weight, and without it, within
     15 %, all of it.
 
-    Parameters
-    ----------
-    raw : RawC3d
-        The file.
-    plates : sequence of PlateParameters
-        What it says of each plate.
-    metres : float
-        The file's length unit in m.
-    turn : Array
-        (3, 3), from file axes to the lab.
-    mass : float or None
-        kg of the person, None = not known.
-
-    Returns
-    -------
-    readings : list of PlateReading
-        Of the plates that make sense.
-    refused : dict
-        By number why others are not used: corners, ORIGIN or channels make no sense; the sentence says which value and
-        what would be legal.
-    warnings : tuple of str
-        What was decided about the scale of the whole file.
+    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab, ``mass`` kg is the
+    person's (None = not known). Return the readings of the plates that make sense; by number why others are not used,
+    with the value and what would be legal; and what was decided about the scale of the whole file.
     """
     done, lost = _decode_each(raw, plates, metres, turn)
     used = [column for reading in done for column in reading.plate.channels]

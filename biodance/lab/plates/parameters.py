@@ -52,29 +52,14 @@ _TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
 class PlateParameters:
     """One plate as the file describes it, in file units and file axes.
 
-    Attributes
-    ----------
-    number : int
-        From 1.
-    type : int
-        TYPE of the C3D standard.
-    channels : tuple of int
-        Columns of the analog data, from 0.
-    corners, origin : Array
-        (4, 3) and (3,), in the file's length unit; the corners in file axes, ORIGIN in plate axes.
-    factors : tuple of float
-        SI unit per unit of each channel, after the calibration matrix where there is one.
-    units_said : tuple of str
-        What was decided about the units; more than one sentence where the file does not say one of them.
-    zero : tuple of int or None
-        FORCE_PLATFORM:ZERO as written, first and last sample from 1; None if it is missing or not two numbers.
-    calibration : Array or None
-        (rows, columns), output = calibration @ channels: N, and N times the file's length unit; that of session.toml
-        gives N and N·m. None where the type has none.
-    polynomial : Array or None
-        (2, 6) Kistler's correction of the centre of pressure in millimetres; None = none.
-    told : ToldPlate
-        What of it session.toml says.
+    ``number`` from 1; ``type`` of the C3D standard; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3)
+    and ``origin`` (3,) in the file's length unit, the corners in file axes, ORIGIN in plate axes; ``factors`` SI unit
+    per unit of each channel, after the calibration matrix where there is one; ``units_said`` what was decided about the
+    units, more than one sentence where the file does not say one of them; ``zero`` FORCE_PLATFORM:ZERO as written,
+    first and last sample from 1, None if it is missing or not two numbers; ``calibration`` (rows, columns), output =
+    calibration @ channels: N, and N times the file's length unit (that of session.toml gives N and N·m), None where the
+    type has none; ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none;
+    ``told`` what of it session.toml says.
     """
 
     number: int

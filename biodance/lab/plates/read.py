@@ -24,7 +24,7 @@ from biodance.lab.plates.decode import (
 )
 from biodance.lab.plates.parameters import POUND, declared_plates
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
-from biodance.records import Array, Defect, Markers, Mask, Plate, Wrench
+from biodance.records import Array, Defect, Markers, Plate, Wrench
 from biodance.records.attention import WrongWeight
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 
@@ -115,7 +115,15 @@ def without_padding(
     defect. Padding: recording programs and filters that need what was before the first or after the last sample write
     that sample again; nothing was measured there.
     """
-    padded = _padded_samples(raw, markers)
+    padded = np.zeros(len(raw.analog), dtype=bool)
+    # Channels that never change say nothing of padding.
+    live = raw.analog[:, (raw.analog != raw.analog[:1]).any(axis=0)] if len(raw.analog) else raw.analog
+    first, last = (_repeats(live), _repeats(live[::-1])) if live.size else (0, 0)
+    # Padding only where the markers go on meanwhile.
+    if first and _moves(markers, 0.0, first / raw.analog_rate):
+        padded[:first] = True
+    if last and _moves(markers, (len(live) - last) / raw.analog_rate, np.inf):
+        padded[-last:] = True
     if not any((np.abs(reading.sensor[padded, 2]) > TOUCH_FORCE).any() for reading in readings):
         return [*readings], []
     first = int(np.argmin(padded)) if padded[:1].any() else 0
@@ -129,21 +137,6 @@ def without_padding(
     )
     lost = float(padded.sum() / raw.analog_rate)
     return [replace(one, known=one.known & ~padded) for one in readings], [Defect("padding", "", said, lost, "s")]
-
-
-def _padded_samples(raw: RawC3d, markers: Markers | None) -> Mask:
-    """Return (S,) True at the ends where all channels repeat one sample though the markers go on."""
-    padded = np.zeros(len(raw.analog), dtype=bool)
-    # Channels that never change say nothing of padding.
-    live = raw.analog[:, (raw.analog != raw.analog[:1]).any(axis=0)] if len(raw.analog) else raw.analog
-    if not live.size:
-        return padded
-    first, last = _repeats(live), _repeats(live[::-1])
-    if first and _moves(markers, 0.0, first / raw.analog_rate):
-        padded[:first] = True
-    if last and _moves(markers, (len(live) - last) / raw.analog_rate, np.inf):
-        padded[-last:] = True
-    return padded
 
 
 def _repeats(live: Array) -> int:

@@ -17,9 +17,8 @@ from biodance.discovery import Chosen, Family, missing_of
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
 from biodance.lab.markers.signals import unseen_at_origin, without_frozen
-from biodance.lab.plain_text import decode
+from biodance.lab.plain_text import decode, read_bytes
 from biodance.lab.plates.corners import Told, as_told
-from biodance.library import refuse_special
 from biodance.records import Role, Trial
 
 
@@ -124,17 +123,7 @@ def read_head(path: Path) -> bytes:
     """
     if path.is_dir():
         raise FileRefused(f"{path}: is a folder, a file is expected. Point at one recording.")
-    refuse_special(path)
-    try:
-        with open(path, "rb") as stream:
-            head = stream.read(_HEAD)
-    except OSError as error:
-        raise FileRefused(
-            f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights."
-        ) from error
-    if not head:
-        raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
-    return head
+    return read_bytes(path, most=_HEAD)
 
 
 def sniffed(path: Path, head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
@@ -194,7 +183,11 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = _read(reader, path, role, subject, told)
+        if told is not None and getattr(reader, "FOLLOWS_TOLD", False):
+            trial = reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
+        else:
+            trial = reader.read(path, role=role, subject=subject)
+            trial = trial if told is None else as_told(trial, told)
         if trial.markers is not None:
             xyz, said = unseen_at_origin(trial.markers.xyz)
             trial = replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said))
@@ -207,12 +200,3 @@ def read_trial(
             f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are "
             f"not affected."
         ) from error
-
-
-def _read(reader: Reader, path: Path, role: Role, subject: str | None, told: Told | None) -> Trial:
-    """Return the trial as its reader reads it, with what is ``told``."""
-    if told is None:
-        return reader.read(path, role=role, subject=subject)
-    if getattr(reader, "FOLLOWS_TOLD", False):
-        return reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
-    return as_told(reader.read(path, role=role, subject=subject), told)

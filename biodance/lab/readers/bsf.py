@@ -1,7 +1,6 @@
 """AMTI NetForce: force plates in a binary file."""
 
 import struct
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,50 +52,19 @@ _MICROVOLT = 1e6
 _MOST_PLATES, _MOST_CHANNELS, _FASTEST = 16, 32, 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class _BsfPlate:
-    """One plate: ``load`` (S, 6) N, N·m on it, plate axes; ``size`` (x, y), ``offset``, ``distance`` (3,) m."""
-
-    model: str
-    serial: int
-    size: tuple[float, float]
-    offset: Array
-    distance: Array
-    load: Array
-
-
-def _parse_bsf(content: bytes, path: Path) -> tuple[Any, list[_BsfPlate], int]:
-    """Return the main header, the plates in SI units, and the number of other channels."""
-    main = _main_header(content, path)
-    version, rate = int(main["version"]), int(main["rate"])
-    headers, end = _instruments(content, main, path)
-    channels = [int(h["channels"]) for h in headers]
-    samples = round(float(main["seconds"]) * rate)
-    data = _data(content, samples, sum(channels), _SAMPLE[version], end, len(headers), path)
-    first = np.concatenate([[0], np.cumsum(channels)])
-    plates = []
-    for i, header in enumerate(headers[: int(main["plates"])]):
-        if channels[i] != 6:
+def _load(block: NDArray[Any], header: Any, version: int, where: str) -> Array:
+    """Return the load (S, 6) N, N·m on a plate, plate axes, from its samples as stored."""
+    factor = np.ones(6)
+    if version == 100:  # lbf, in·lbf a count
+        told = ("sensitivity", "gain", "excitation", "counts_per_volt")
+        product = np.prod([header[name][:6].astype(float) for name in told], axis=0)
+        if not ((np.abs(product) <= LARGEST_NUMBER**2) & (np.abs(product) >= 1 / LARGEST_NUMBER)).all():
             raise FileRefused(
-                f"{path}: plate {i + 1} has {channels[i]} channels, legal are 6 (Fx to Mz). Export the trial as text "
-                f"instead."
+                f"{where} holds ADC counts but a calibration value is 0 or no number. Enter the calibration in "
+                f"NetForce and save again."
             )
-        block = data[:, first[i] : first[i] + 6].astype(float)
-        factor = np.ones(6)
-        if version == 100:  # lbf, in·lbf a count
-            told = ("sensitivity", "gain", "excitation", "counts_per_volt")
-            product = np.prod([header[name][:6].astype(float) for name in told], axis=0)
-            if not ((np.abs(product) <= LARGEST_NUMBER**2) & (np.abs(product) >= 1 / LARGEST_NUMBER)).all():
-                raise FileRefused(
-                    f"{path}: plate {i + 1} holds ADC counts but a calibration value is 0 or no number. Enter the "
-                    f"calibration in NetForce and save again."
-                )
-            factor = _MICROVOLT / product
-        model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
-        size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
-        offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
-        plates.append(_BsfPlate(model, int(header["serial"]), size, offset, distance, block * factor * _IMPERIAL))
-    return main, plates, sum(channels[int(main["plates"]) :])
+        factor = _MICROVOLT / product
+    return block.astype(float) * factor * _IMPERIAL
 
 
 def _main_header(content: bytes, path: Path) -> Any:
@@ -184,21 +152,34 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     """
     path = Path(path)
     content = read_bytes(path)
-    main, recorded, others = _parse_bsf(content, path)
+    main = _main_header(content, path)
     version, rate, plates, warnings, centre = int(main["version"]), float(main["rate"]), [], [], np.zeros(3)
+    headers, end = _instruments(content, main, path)
+    channels, count = [int(header["channels"]) for header in headers], int(main["plates"])
+    samples, first = round(float(main["seconds"]) * int(main["rate"])), np.concatenate([[0], np.cumsum(channels)])
+    data = _data(content, samples, sum(channels), _SAMPLE[version], end, len(headers), path)
     stored = "ADC counts times the calibration in the header" if version == 100 else "engineering units"
-    for number, plate in enumerate(recorded, start=1):
-        _refuse_nonsense(plate, number, path)
-        if number > 1:
-            centre = centre + PLATE_UPRIGHT @ plate.distance
-            warnings.append(_placed(plate, number))
-        name = f"{plate.model or 'Plate'}, serial {plate.serial}"
+    for i, header in enumerate(headers[:count]):
+        where = f"{path}: plate {i + 1}"
+        if channels[i] != 6:
+            raise FileRefused(
+                f"{where} has {channels[i]} channels, legal are 6 (Fx to Mz). Export the trial as text instead."
+            )
+        load = _load(data[:, first[i] : first[i] + 6], header, version, where)
+        size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
+        offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
+        _refuse_nonsense(size, offset, where)
+        if i:
+            centre = centre + PLATE_UPRIGHT @ distance
+            warnings.append(_placed(PLATE_UPRIGHT @ distance, i + 1))
+        model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
+        name = f"{model or 'Plate'}, serial {int(header['serial'])}"
         said = (f"{name}: {stored}; lbf and in·lbf were converted to N and N·m.",)
-        done, odd = amti_plate(number, plate.load, plate.size, centre, plate.offset, rate=rate, said=said)
+        done, odd = amti_plate(i + 1, load, size, centre, offset, rate=rate, said=said)
         plates.append(done)
         warnings += odd
     history = [f"AMTI NetForce file, version {version}, {rate:g} Hz."]
-    if others:
+    if others := sum(channels[count:]):
         history.append(f"{others} channels of other instruments were not read.")
     source = Source(path, sha256(content), f"AMTI .bsf {version}", analog_rate=rate)
     # the subject's mass (kg) and height (m), where they make sense
@@ -212,26 +193,26 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
     return Trial(path.stem, role, None, tuple(plates), source, "", measures, tuple(history), tuple(warnings))
 
 
-def _refuse_nonsense(plate: _BsfPlate, number: int, path: Path) -> None:
-    if not SHORTEST_SIDE <= min(plate.size) <= max(plate.size) <= LONGEST_SIDE:
+def _refuse_nonsense(size: tuple[float, float], offset: Array, where: str) -> None:
+    if not SHORTEST_SIDE <= min(size) <= max(size) <= LONGEST_SIDE:
         raise FileRefused(
-            f"{path}: plate {number} is {plate.size[0]:.3g} x {plate.size[1]:.3g} m, legal are sides of "
-            f"{SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Enter the plate's size in NetForce and save again."
+            f"{where} is {size[0]:.3g} x {size[1]:.3g} m, legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. "
+            f"Enter the plate's size in NetForce and save again."
         )
-    if not np.abs(plate.offset).max() <= DEEPEST:
+    if not np.abs(offset).max() <= DEEPEST:
+        path, _, plate = where.rpartition(": ")
         raise FileRefused(
-            f"{path}: the sensor of plate {number} is said to lie {np.abs(plate.offset).max():.3g} m off. Correct its "
-            f"offset in NetForce."
+            f"{path}: the sensor of {plate} is said to lie {np.abs(offset).max():.3g} m off. Correct its offset in "
+            f"NetForce."
         )
 
 
-def _placed(plate: _BsfPlate, number: int) -> str:
-    if not plate.distance.any():
+def _placed(away: Array, number: int) -> str:
+    if not away.any():
         return (
             f"Plate {number}: the file says no distance to the plate before it, so both lie at one place. Enter "
             f"it in NetForce."
         )
-    away: Array = PLATE_UPRIGHT @ plate.distance
     return (
         f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
         f"says. Check that."

@@ -1,186 +1,38 @@
 """Tables of markers and forces, CSV, TSV and Parquet as data sets publish them: labels, units where a row or the labels
 say them, numbers with decimal points or commas.
+
+Of plates a table says three forces and three moments, and neither about which point nor along which axes. They are
+taken along the axes of the markers, in the unit of the labels or that in which they weigh a person, with the sign that
+pushes up, where session.toml says. Else, where the pressures that follow lie under the feet, the moments are about the
+lab's origin; where they lie elsewhere and a single plate carries everything, about its own, which is put where the feet
+stand.
 """
 
-import io
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.markers.guess import guess_set
-from biodance.lab.markers.sets import read_marker_set, recognise
+from biodance.lab.markers.sets import MarkerSet, landmark, read_marker_set, recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
 from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
-from biodance.lab.plain_text import COMMAS_READ, decode, read_bytes, sha256
-from biodance.lab.plates.corners import Told
-from biodance.lab.plates.parameters import channel_groups
+from biodance.lab.plain_text import Cells, clean_label, header_of, is_parquet, read_bytes, read_cells, sha256
+from biodance.lab.plates.corners import C3D_ONLY, NOTHING_TOLD, Told, around_pressures, plate_axes
+from biodance.lab.plates.decode import find_baseline
+from biodance.lab.plates.parameters import FORCE, MOMENT, channel_groups, plain_unit
+from biodance.lab.plates.read import PlatesRead
 from biodance.lab.readers import head_text
-from biodance.lab.readers._table_forces import Load, loads_of, table_plates
-from biodance.records import Array, Markers, Role, Source, Trial
-
-_QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
-_HEADER_ROWS = 30
-_PARQUET = b"PAR1"
-_UNIT = re.compile(r"^(.*?)[\s_]*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """``labels``, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty; ``said`` how read."""
-
-    labels: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Array
-    said: tuple[str, ...] = ()
-
-
-def is_parquet(content: bytes) -> bool:
-    """Return whether bytes begin as those of a Parquet file."""
-    return content.startswith(_PARQUET)
-
-
-def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:
-    """Return the cells of a table of ``least`` columns or more in a file's ``content``.
-
-    Raises
-    ------
-    FileRefused
-        No row of labels, rows of the wrong length, a cell that is no number, a Parquet file that is damaged or cannot
-        be read for want of pyarrow.
-    """
-    return _of_parquet(content, path) if is_parquet(content) else _of_text(decode(content, path), path, least)
-
-
-def header_of(text: str, *, least: int = 4) -> tuple[int, str, tuple[str, ...]] | None:
-    """Return row (from 0), separator and cells of the labels: the first row of >= ``least`` cells, most no numbers."""
-    for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
-        for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
-            found = tuple(cell.strip() for cell in line.split(separator))
-            words = sum(not _NUMBER.fullmatch(cell) for cell in found)
-            if len(found) >= least and 2 * words > len(found):
-                return row, separator, found
-    return None
-
-
-def clean_label(cell: str) -> tuple[str, str]:
-    """Return label and unit of a cell such as ``"LASI x (mm)"`` or ``’time'``, without quotes; "" = no unit."""
-    plain = cell.strip().strip(_QUOTES + " ")
-    tuple_like = re.fullmatch(r"\((.*)\)", plain)  # several rows of labels, as pandas writes them
-    if tuple_like and "," in plain:
-        return "_".join(part.strip().strip(_QUOTES) for part in tuple_like[1].split(",")), ""
-    unit = _UNIT.fullmatch(plain)
-    return (unit[1].strip(), unit[2]) if unit and unit[1] else (plain, "")
-
-
-def _of_text(text: str, path: Path, least: int) -> Cells:
-    header = header_of(text, least=least)
-    if header is None:
-        raise FileRefused(f"{path}: no row holds the labels of columns. Write them into the first row, as LASI_x.")
-    row, separator, found = header
-    lines = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
-    body = [(number, line) for number, line in lines if number > row + 1]
-    labels, units = (list(some) for some in zip(*map(clean_label, found), strict=True))
-    if body and not any(_NUMBER.fullmatch(cell.strip()) and cell.strip() for cell in body[0][1].split(separator)):
-        below = [clean_label(f"x ({cell.strip()})")[1].strip("()[]") for cell in body[0][1].split(separator)]
-        units = [unit or said for unit, said in zip(units, [*below, *[""] * len(units)], strict=False)]
-        body = body[1:]
-    commas = separator != "," and any("," in line for _, line in body) and not any("." in line for _, line in body)
-    said = [f"Columns are parted by {_SEPARATORS[separator]}.", *[COMMAS_READ] * commas]
-    body, cut = _whole_rows(body, separator, len(labels), path)
-    values = _numbers(body, separator, len(labels), commas=commas, path=path)
-    return Cells(tuple(labels), tuple(units), values, (*said, *cut))
-
-
-def _whole_rows(
-    body: list[tuple[int, str]], separator: str, width: int, path: Path
-) -> tuple[list[tuple[int, str]], list[str]]:
-    """Return the rows of ``width`` cells; only the last may be cut off, which is said."""
-    if not body:
-        raise FileRefused(f"{path}: holds labels and no row of numbers. Export it again.")
-    cut: list[str] = []
-    if len(body) > 1 and body[-1][1].count(separator) + 1 < width:
-        cut = [f"The last row ({body[-1][0]}) is cut off and was left out."]
-        body = body[:-1]
-    for number, line in body:
-        count = (
-            len(line.rstrip(separator).split(separator))
-            if line.count(separator) >= width
-            else line.count(separator) + 1
-        )
-        if count > width or line.count(separator) + 1 < width:
-            raise FileRefused(
-                f"{path}: row {number} holds {count} cells, {width} are expected. Correct it or export it again."
-            )
-    return body, cut
-
-
-def _numbers(body: list[tuple[int, str]], separator: str, width: int, *, commas: bool, path: Path) -> Array:
-    import pandas as pd
-
-    text = "\n".join(line for _, line in body)
-    try:
-        table = pd.read_csv(
-            io.StringIO(text),
-            sep=separator,
-            header=None,
-            decimal="," if commas else ".",
-            usecols=range(width),
-            skipinitialspace=True,
-            low_memory=False,
-        )
-    except pd.errors.ParserError as error:
-        raise FileRefused(
-            f"{path}: a quotation mark is opened and never closed among the numbers. Take it out or export the file "
-            f"again."
-        ) from error
-    for column in range(width):
-        if not pd.api.types.is_numeric_dtype(table[column]):
-            wrong = pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()
-            at = int(np.argmax(wrong)) if wrong.any() else 0
-            raise FileRefused(
-                f"{path}: row {body[at][0]}, column {column + 1}: {table[column][at]!r} is not a number. Correct that "
-                f"cell or export the file again."
-            )
-    return table.to_numpy(dtype=float)
-
-
-def _of_parquet(content: bytes, path: Path) -> Cells:
-    import pandas as pd
-
-    try:
-        table = pd.read_parquet(io.BytesIO(content))
-    except ImportError as error:
-        raise FileRefused(
-            f"{path}: reading Parquet needs pyarrow. Install it (pip install pyarrow), or export the table as CSV."
-        ) from error
-    except Exception as error:
-        raise FileRefused(f"{path}: is a damaged Parquet file ({error}). Export it again.") from error
-    index = [] if isinstance(table.index, pd.RangeIndex) else [table.index.to_numpy()]
-    names = [str(table.index.name or "index")] * len(index) + [str(name) for name in table.columns]
-    columns = [*index, *(table[name].to_numpy() for name in table.columns)]
-    kept = [(name, column) for name, column in zip(names, columns, strict=True) if column.dtype.kind in "iufmM"]
-    labels, units = zip(*(clean_label(name) for name, _ in kept), strict=True) if kept else ((), ())
-    values = [
-        np.where(
-            np.isnat(c),
-            np.nan,
-            c.astype("timedelta64[ns]" if c.dtype.kind == "m" else "datetime64[ns]").astype("int64") / 1e9,
-        )
-        if c.dtype.kind in "mM"
-        else c.astype(float)
-        for _, c in kept
-    ]
-    return Cells(labels, units, np.stack(values, axis=1) if values else np.empty((0, 0)), ("Read from Parquet.",))
-
+from biodance.records import SIDES, Array, Markers, Mask, Plate, Role, Source, Trial, Wrench
+from biodance.settings import COP_FORCE, STANDARD_GRAVITY
+from biodance.spatial import wrench_about_origin
 
 _TIME = re.compile(
     r"(?:time|t|time[\s_]?stamps?|stamps?|elapsed(?:[\s_]?time)?|seconds?|secs?)"
@@ -263,6 +115,13 @@ def sniff(head: bytes) -> bool:
         return False
     columns = columns_in([clean_label(cell)[0] for cell in header[2]])
     return columns.time is not None and len(columns.markers) >= FEWEST_MARKERS
+
+
+class Load(NamedTuple):
+    """What a table holds of one plate: ``columns`` as it calls them, ``value`` (S, 6) N and N·m as written."""
+
+    columns: str
+    value: Array
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
@@ -397,3 +256,239 @@ def _time_said(axis: TimeAxis, markers: Markers, loads: list[Load]) -> list[str]
         f"noise of single samples is multiplied by {axis.noise:.2f}."
     )
     return [axis.said, cost]
+
+
+_PERSON = (50.0, 4000.0)  # N that the mean load on plates can be: a child of 5 kg to 400 kg
+_FARTHEST = 20.0
+"""m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
+_SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
+_UNDER = 0.25  # m between pressure and feet up to which they belong together: a foot's length
+_FLAT = 0.03
+"""m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
+_SINKS = 0.02
+"""m by which the mean marker may be lower than when the person stands as high as ever: who squats or bends leans."""
+_PRESSED = 0.58
+"""Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
+laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
+"""
+_PLACE_SD = 0.013  # m along the feet, the same 12 people: what their way of leaning leaves open
+
+
+def loads_of(
+    groups: Sequence[tuple[int, ...]], labels: Sequence[str], units: Sequence[str], values: Array
+) -> tuple[list[Load], str]:
+    """Return the load on every plate in N and N·m, and the sentence that says in which units it was written.
+
+    A unit is that of the labels, else the one in which the load can be a person's and the pressure in a room.
+    """
+    if not groups:
+        return [], ""
+    force = plain_unit(next((units[k] for group in groups for k in group[:3] if units[k]), ""))
+    moment = plain_unit(next((units[k] for group in groups for k in group[3:] if units[k]), ""))
+    by_label = ", as the labels say" if force in FORCE and moment in MOMENT else ""
+    total = np.sum([values[:, list(group[:3])] for group in groups], axis=0)
+    size = float(np.linalg.norm(np.nanmean(total, axis=0)))
+    if force not in FORCE:
+        force = next((unit for unit in ("n", "kn") if _PERSON[0] <= size * FORCE[unit] <= _PERSON[1]), "n")
+    if moment not in MOMENT:
+        moment = "nmm" if _arm(groups, values) > _FARTHEST * FORCE[force] else "nm"
+    factors = [FORCE[force]] * 3 + [MOMENT[moment]] * 3
+    loads = [Load(f"{labels[group[0]]} ... {labels[group[-1]]}", values[:, list(group)] * factors) for group in groups]
+    weight = size * FORCE[force]
+    return loads, (
+        f"Forces were read in {_SPELLED.get(force, force)}, moments in {_SPELLED.get(moment, moment)}{by_label}: the "
+        f"mean force is {weight:.0f} N, the weight of {weight / STANDARD_GRAVITY:.1f} kg."
+    )
+
+
+def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
+    """Return the median horizontal moment over the force, in the units of the table; 0 without load."""
+    moment, force = (
+        np.concatenate([np.linalg.norm(values[:, list(group[part])], axis=1) for group in groups])
+        for part in (slice(3, 5), slice(0, 3))
+    )
+    # Where at least a tenth of the largest force acts.
+    loaded = force > 0.1 * np.nanmax(force, initial=0.0)
+    return float(np.nanmedian(moment[loaded] / force[loaded])) if loaded.any() else 0.0
+
+
+def table_plates(
+    loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
+) -> PlatesRead:
+    """Return the plates of a table in the lab frame, ground on subject.
+
+    ``loads`` on ``time`` (T,) s, with the wrench in the axes of the file; ``turn`` (3, 3) lab_R_file; ``markers`` (m,
+    z up) of the same table, which may have another time; ``worn`` the marker set; ``told`` what session.toml says of
+    the plates, by ``plate1`` ... in the order of the columns.
+    """
+    said = [told.plates.get(f"plate{number}", NOTHING_TOLD) for number in range(1, len(loads) + 1)]
+    history = [f"plate{n} was left out, as session.toml says." for n, one in enumerate(said, 1) if not one.use]
+    used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
+    placed = []
+    for n, load, one in used:
+        if one.corners is not None:
+            # along the plate's own axes, about its centre
+            turned, zero, zeroed = _zeroed(_turned(load.value, plate_axes(one.corners)), time)
+            signed, sign = _upright(turned)
+            wrench = Wrench(time, wrench_about_origin(signed, one.corners.mean(axis=0)))
+            about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
+            decided = (about, zeroed, sign)
+            placed.append(Plate(f"plate{n}", 0, one.corners, wrench, decided, zero, columns=load.columns))
+    free = [(n, load) for n, load, one in used if one.corners is None]
+    if free:
+        feet = _feet(markers, worn)
+        done = _by_feet(free, time, turn, feet)
+        placed += done.plates
+        history += done.history
+        if done.warnings:
+            return PlatesRead(tuple(placed), done.warnings, tuple(history))
+    plates = []
+    for plate in sorted(placed, key=lambda one: int(one.name.removeprefix("plate"))):
+        one = told.plates.get(plate.name, NOTHING_TOLD)
+        followed = [f"{one.sentence[0].upper()}{one.sentence[1:]}"] if one.sentence else []
+        plates.append(replace(plate, foot=one.foot, decisions=(*plate.decisions, *followed)))
+    idle = {name: ", ".join(key for key in one.keys if key in C3D_ONLY) for name, one in told.plates.items()}
+    warnings = [
+        f"{name}: {keys} of session.toml can be followed in C3D files only." for name, keys in idle.items() if keys
+    ]
+    return PlatesRead(tuple(plates), tuple(warnings), tuple(history))
+
+
+def _upright(value: Array) -> tuple[Array, str]:
+    """Return the wrench (T, 6) as the ground's action on the subject, and the sentence that says so."""
+    if np.nanmean(value[:, 2]) >= 0:
+        return value, "Sign: the mean force points up, so the table holds the action of the ground; it was kept."
+    return -value, "Sign: the mean force points down, so the table holds the load on the plate; all of it was turned."
+
+
+def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
+    """Return the wrench less what the empty plate reads, that force (3,) N, and the sentence about it."""
+    known = np.isfinite(value).all(axis=1)
+    if time.size < 2 or not known.all():
+        return value, np.zeros(3), "Zero: nothing was subtracted."
+    window = find_baseline(value[:, 2], zero=None, rate=1 / float(np.median(np.diff(time))))
+    said = re.sub(r"the file names no window \(ZERO is missing\)\. ?", "", window.said)
+    if window.stop <= window.start:
+        return value, np.zeros(3), said
+    reads = value[window.start : window.stop].mean(axis=0)
+    return value - reads, reads[:3], said
+
+
+def _turned(value: Array, turn: Array) -> Array:
+    """Return forces and moments (T, 6) along the axes that ``turn`` (3, 3) leads to."""
+    return np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T])
+
+
+@dataclass(frozen=True, eq=False)
+class _Feet:
+    """Where the feet are: ``middle`` (F, 2) m where those on the ground are pressed at ``time`` (F,), NaN while none
+    is; ``standing`` (F,) whether both are and the person stands as high as ever.
+    """
+
+    time: Array
+    middle: Array
+    standing: Mask
+
+
+def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
+    """Return where the feet are by their heels and toes; None where the labels do not tell these."""
+    if worn is None:
+        return None
+    ends = [[landmark(markers, worn, f"{side}_{end}") for end in ("heel", "toe")] for side in SIDES]
+    if any(end is None for foot in ends for end in foot):
+        return None
+    places = np.array(ends, dtype=float)  # (side, end, T, 3)
+    # Fifth percentile: single frames below the ground do not count.
+    lowest = np.nanpercentile(places[..., 2], 5, axis=2, keepdims=True)
+    down = (places[..., 2] < lowest + _FLAT).all(axis=1)  # (side, T)
+    # Between heel and toe, at the share where people press.
+    pressed = (1 - _PRESSED) * places[:, 0, :, :2] + _PRESSED * places[:, 1, :, :2]
+    foot = np.where(down[..., None], pressed, np.nan)
+    # Both down: between them; one down: under it.
+    middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
+    both = down.all(axis=0)
+    height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
+    upright = height > np.nanpercentile(height[both], 95) - _SINKS if both.any() else both
+    return _Feet(markers.time, middle, both & upright)
+
+
+def _pressure(value: Array) -> Array:
+    """Return the centre of pressure (T, 2) m about the point of the moments; NaN without load."""
+    vertical = value[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # x = -My / Fz, y = Mx / Fz.
+        cop = np.stack([-value[:, 4] / vertical, value[:, 3] / vertical], axis=1)
+    return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
+
+
+def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> PlatesRead:
+    """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
+    zeroed = [_zeroed(_turned(load.value, turn), time) for _, load in free]
+    signed = [_upright(value) for value, _, _ in zeroed]
+    total = np.sum([value for value, _ in signed], axis=0)
+    # The place is told by the total: which foot is on which plate does not matter.
+    shift = None if feet is None else _shift(total, time, feet)
+    if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
+        return PlatesRead(warnings=(_lacking([n for n, _ in free], feet, shift),))
+    own = float(np.linalg.norm(shift)) > _UNDER
+    at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
+    plates, history = [], []
+    for (number, load), (value, said), (_, zero, empty) in zip(free, signed, zeroed, strict=True):
+        wrench = Wrench(time, wrench_about_origin(value, at))
+        cop = wrench.cop()[:, :2]
+        if not np.isfinite(cop).any():
+            history.append(f"plate{number} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
+            continue
+        decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
+        points = np.concatenate([cop, feet.middle]) if own and feet is not None else cop
+        corners = around_pressures(points, 0.0)
+        name, put = f"plate{number}", shift if own else None
+        plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
+    return PlatesRead(tuple(plates), history=tuple(history))
+
+
+_ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
+
+
+def _put(shift: Array) -> str:
+    """Say where a plate was put by the feet, at ``shift`` (2,) m."""
+    return (
+        f"Place: the table does not say it. The moments are not about the lab's origin (the pressure would lie "
+        f"{np.linalg.norm(shift):.2f} m beside the feet), so they are about the plate's own point, which was put at "
+        f"({shift[0]:.3f}, {shift[1]:.3f}, 0) m, where the pressure lies under the feet as people stand: known "
+        f"to {1000 * _PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
+    )
+
+
+def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
+    """Return the median (2,) m by which loaded feet on the ground lie beside the pressure; None without any."""
+    known = np.isfinite(_pressure(total)).all(axis=1)
+    if known.sum() < 1:
+        return None
+    pressure = np.stack([np.interp(feet.time, time[known], axis[known]) for axis in _pressure(total).T], axis=1)
+    beside = feet.middle - pressure
+    told = np.isfinite(beside).all(axis=1)
+    best = told & feet.standing if (told & feet.standing).any() else told
+    return np.asarray(np.median(beside[best], axis=0)) if best.any() else None
+
+
+def _lacking(numbers: Sequence[int], feet: _Feet | None, shift: Array | None) -> str:
+    """Say why plates of a table cannot be placed, and what to write."""
+    names = ", ".join(f"plate{n}" for n in numbers)
+    if feet is None:
+        why = "no heels and toes are known among the markers that could show it"
+    elif shift is None:
+        why = "nobody stands on them with a foot on the ground"
+    else:
+        why = (
+            f"with moments about the lab's origin the pressure lies {np.linalg.norm(shift):.2f} m beside the feet, and "
+            f"of several plates these do not tell which is where"
+        )
+    tables = " ".join(
+        f"[plates.plate{n}] corners_m = [[x, y, 0], [x, y, 0], [x, y, 0], [x, y, 0]]" for n in numbers[:2]
+    )
+    return (
+        f"The table does not say where {names} lie{'s' * (len(numbers) == 1)}, and {why}: no force was read. Write the "
+        f"corners in m in the lab frame, in the order +x+y, -x+y, -x-y, +x-y of the plate's axes, into session.toml: "
+        f"{tables}."
+    )

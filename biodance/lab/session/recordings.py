@@ -305,9 +305,10 @@ def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
     Of two copies the static trial stays, else the one of the shorter name. A reader of one's own need not say what
     bytes it read.
     """
+    held = {id(trial): trial.source.sha256 or f"{trial.source.path} {trial.name}" for trial in trials}
     first: dict[str, Trial] = {}
     for trial in sorted(trials, key=lambda one: (one.role != "static", len(one.name), one.name)):
-        kept = first.setdefault(_bytes_of(trial), trial)
+        kept = first.setdefault(held[id(trial)], trial)
         if kept is not trial:
             notes.append(
                 Doubt(
@@ -316,11 +317,7 @@ def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
                     "Move one of the two away.",
                 )
             )
-    return [trial for trial in trials if first[_bytes_of(trial)] is trial]
-
-
-def _bytes_of(trial: Trial) -> str:
-    return trial.source.sha256 or f"{trial.source.path} {trial.name}"
+    return [trial for trial in trials if first[held[id(trial)]] is trial]
 
 
 def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Trial], dict[str, str]]:

@@ -318,9 +318,7 @@ def results_folder(out: str | Path, session: str | Path, *, force: bool = False)
         raise SessionRefused(
             f"{folder}: holds files that biodance did not write ({files[0].name}). Give another folder."
         )
-    part = folder / ".part" if os.path.ismount(folder) else folder.with_name(f".{folder.name}.part")
-    _taken(part, folder)
-    return ResultsFolder(folder, part)
+    return ResultsFolder(folder, _taken(folder))
 
 
 def made_folder(folder: Path) -> Path:
@@ -349,8 +347,7 @@ def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
     if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not over)):
         raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
     place = Path(os.path.realpath(folder))
-    part = place / ".part" if os.path.ismount(place) else place.with_name(f".{place.name}.part")
-    _taken(part, place)
+    part = _taken(place)
     try:
         with _as_before(folder):
             yield part
@@ -372,8 +369,11 @@ def _as_before(place: Path) -> Iterator[None]:
         ) from error
 
 
-def _taken(part: Path, place: Path) -> None:
-    """Make the folder ``part`` for this process, empty; SessionRefused where another one, still alive, has it."""
+def _taken(place: Path) -> Path:
+    """Return the folder in which what takes its ``place`` is made, empty and of this process; SessionRefused where
+    another one, still alive, has it.
+    """
+    part = place / ".part" if os.path.ismount(place) else place.with_name(f".{place.name}.part")
     lock, mine, holder = part / _LOCK, f"{os.getpid()} {platform.node()}", ""
     with suppress(OSError):
         holder = lock.read_text(encoding="ascii", errors="replace")
@@ -392,6 +392,7 @@ def _taken(part: Path, place: Path) -> None:
             f"{place}: cannot be written to ({error.strerror or error}). Choose a place where you may write."
         ) from error
     atexit.register(shutil.rmtree, part, ignore_errors=True)
+    return part
 
 
 def _is_alive(holder: str) -> bool:

@@ -9,10 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from biodance.cycles.beside import EMG
-from biodance.cycles.keys import ANGLE_PANELS, GROUND_PEAKS, LOAD_PANELS
+from biodance.cycles.movement import EMG
 from biodance.cycles.scores import SCORE_ANGLES, GaitScores, NormalCurve
-from biodance.cycles.summary import KeySummary, LeftOutBecause, Repetitions, Spread
+from biodance.cycles.summary import (
+    ANGLE_PANELS,
+    GROUND_PEAKS,
+    LOAD_PANELS,
+    KeySummary,
+    LeftOutBecause,
+    Repetitions,
+    Spread,
+)
 from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
 from biodance.records import SIDES
