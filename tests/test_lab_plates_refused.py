@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from plate_emulator import Emulated, channels, raw_file, step
 
-from biodance.lab.plates.corners import corners_in_lab, plate_axes
+from biodance.lab.plates.decode import corners_in_lab, plate_axes
 from biodance.lab.plates.read import read_plates
 from biodance.records import Markers
 

@@ -14,8 +14,8 @@ from walkers import WEIGHT, Stand, plate, walker
 
 from biodance.errors import SessionRefused
 from biodance.lab.inspect import inspect_paths
-from biodance.lab.plates.corners import Told, ToldPlate, as_told
-from biodance.lab.plates.read import read_plates
+from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.plates.read import as_told, read_plates
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.write import init_session, write_registered

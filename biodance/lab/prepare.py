@@ -188,6 +188,7 @@ def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
     times = [plate.wrench.time for plate in trial.plates if plate.wrench.time.size]
     if not times:
         return markers, []
+    # The coarser of the clocks: one sample of tolerance at both ends.
     step = max((float(np.median(np.diff(time))) for time in times if time.size > 1), default=0.0)
     first, last = max(time[0] for time in times) - step, min(time[-1] for time in times) + step
     inside = (markers.time >= first - 1e-9) & (markers.time <= last + 1e-9)

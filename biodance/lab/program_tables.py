@@ -200,6 +200,7 @@ def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
         point = np.broadcast_to(middle, (wrench.time.size, 3))
         torque = wrench_about_point(wrench.value, point)[:, 3:]
         columns += [f"{segment}_{part}{axis}" for part in ("force_v", "force_p", "torque_") for axis in _AXES]
+        # Rows times R are R' of each vector: from z up back to y up.
         values += [part @ Y_UP_TO_Z_UP for part in (wrench.force, point, torque)]
     return TimeTable(name, tuple(columns), next(iter(feet.values())).time, np.hstack(values))
 

@@ -82,6 +82,7 @@ def _field(parameters: Parameters, name: str) -> float:
     words = parameter_numbers(parameters, "TRIAL", name)
     if words.size == 0 or not np.all(np.isfinite(words)):
         return math.nan
+    # Low word first.
     return _unsigned(float(words[0])) + 65536 * (_unsigned(float(words[1])) if words.size > 1 else 0)
 
 
@@ -170,6 +171,7 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     """Return the pairs (channels, samples per frame) that at most one statement of the file contradicts."""
     used, values, samples = _scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
     ratio = _scalar(parameters, "ANALOG", "RATE") / (_scalar(parameters, "POINT", "RATE") or math.nan)
+    # Samples per frame by the rates; below one half they say nothing.
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
     if not (used > 0 or values > 0):
         return [(0, 0)]
@@ -258,6 +260,7 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
     told = {name: rate for name, rate in witnesses.items() if math.isfinite(rate) and rate > 0}
     if not told:
         return math.nan, math.nan
+    # How many of the witnesses each agrees with, itself included.
     agreeing = {
         name: sum(math.isclose(rate, other, rel_tol=1e-3) for other in told.values()) for name, rate in told.items()
     }

@@ -61,6 +61,7 @@ def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
     """Return the bytes as 32-bit floats (n,) in the processor's number format; DEC (VAX F) becomes IEEE."""
     if processor != DEC:
         return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
+    # VAX F has its two words the other way round and an exponent that is larger by two: a quarter of the IEEE value.
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
     exponent = (words[:, 0] >> 7) & 0xFF  # 0: the value zero, or with a sign no number
     ieee = ((words[:, 0] << 16) | words[:, 1]).view(np.float32)
@@ -90,6 +91,7 @@ def read_header(content: bytes, where: str) -> Header:
             f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 "
             "bytes, expected). Check that the file is a C3D export and not another format with that name."
         )
+    # Blocks are counted from 1.
     start = (content[0] - 1) * C3D_BLOCK
     if start < C3D_BLOCK or start + 4 > len(content):
         raise FileRefused(
@@ -218,8 +220,10 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
         value, end = _value(section, body + 2, processor, damaged)
     if end >= len(section):
         raise damaged
+    # Behind the value: the length of the description in a byte, and the description.
     end += 1 + section[end]
     following = body + offset if offset else 0
+    # The two bytes of the pointer the other way round.
     swapped = (offset >> 8) | ((offset & 0xFF) << 8)  # so some software writes the last pointer of a MIPS file
     if processor == MIPS and following > len(section) and body + swapped == end:
         following = 0 if not any(section[end:]) else end

@@ -44,6 +44,7 @@ def read_numbers(content: bytes, layout: Layout) -> _Numbers:
         order = ">" if layout.processor == MIPS else "<"
         rows = np.frombuffer(section, dtype=order + "i2").reshape(layout.frames, -1)
         analog_rows = rows.view(order + "u2") if layout.unsigned else rows
+    # x, y, z and the word of residual and cameras.
     quads = rows[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
     points = doubles(quads[..., :3])
     if not layout.floating:
@@ -53,6 +54,7 @@ def read_numbers(content: bytes, layout: Layout) -> _Numbers:
     rest = doubles(analog_rows[:, 4 * layout.points :])
     with np.errstate(invalid="ignore", over="ignore"):
         analog = rest.reshape(layout.frames * layout.samples, layout.channels) if layout.channels else np.empty((0, 0))
+        # (number - offset) gain, in place.
         analog -= layout.offset
         analog *= layout.gain
     return points, analog

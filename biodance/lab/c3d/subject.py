@@ -96,6 +96,7 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
         unit = units[column].strip() if column < len(units) else ""
         factor = _MILLIVOLTS.get(unit.lower(), 1.0)
         told = "mV" if unit.lower() in _MILLIVOLTS else unit
+        # What goes below zero is not rectified yet.
         if abs(value.min()) > _RECTIFIED * np.abs(value).max():
             value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
         envelope = np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))
@@ -166,6 +167,7 @@ def read_outputs(path: str | Path) -> FileOutputs:
 def _events(parameters: Parameters, layout: Layout) -> tuple[FootEvent, ...]:
     times = np.asarray(parameters.get("EVENT", {}).get("TIMES", np.empty((2, 0))), dtype=float)
     times = times.reshape(2, -1, order="F") if times.ndim == 1 else times
+    # Times of events count from frame 1 of the camera, ours from the first frame of the file.
     first = (layout.first_frame - 1) / layout.rate
     found = []
     words = zip(times.T, texts(parameters, "EVENT", "CONTEXTS"), texts(parameters, "EVENT", "LABELS"), strict=False)

@@ -12,7 +12,7 @@ from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
 from biodance.lab.c3d.subject import as_written
 from biodance.lab.plain_text import write_whole
-from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.decode import plate_axes
 from biodance.records import Array, Markers, Plate, Trial, assign, freeze, frozen_array
 from biodance.spatial import wrench_about_point
 
@@ -114,6 +114,7 @@ def write_c3d(
     }
     for group, values in (parameters or {}).items():
         groups.setdefault(group, {}).update(values)
+    # The number does not change the length of the section: it is written twice.
     groups["POINT"]["DATA_START"] = 2 + len(_parameter_section(groups)) // C3D_BLOCK
     section = _parameter_section(groups)
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
@@ -203,6 +204,7 @@ def _plate_group(plates: Sequence[PlateRecording]) -> dict[str, FileValue]:
         channel[:size, index] = np.arange(first, first + size)
         first += size
         if plate.calibration is not None:
+            # Rows of force stay N/V, those of moment become N·mm/V.
             matrix[:, :, index] = plate.calibration * np.repeat([1.0, _MM], 3)[:, None]
     group: dict[str, FileValue] = {
         "USED": count,

@@ -153,6 +153,7 @@ def _differences(one: str, other: str) -> list[tuple[str, str]]:
     words = [(a, b) for a, b in zip(_tokens_of(one), _tokens_of(other), strict=False) if a != b]
     whole = words if len(words) == 1 else []
     one, other = one.lower(), other.lower()
+    # From the first sign that differs to the last.
     start = next((k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
     rest = one[start:], other[start:]
     end = next((k for k, (a, b) in enumerate(zip(rest[0][::-1], rest[1][::-1], strict=False)) if a != b), 0)
@@ -343,5 +344,6 @@ def _cuts(token: str) -> list[tuple[str, ...]]:
     """Return the ways to cut a token into known words."""
     if not token:
         return [()]
+    # Each known beginning, and all ways to cut what is behind it.
     ends = [end for end in range(1, len(token) + 1) if token[:end] in _vocabulary().words]
     return [(token[:end], *rest) for end in ends for rest in _cuts(token[end:])]

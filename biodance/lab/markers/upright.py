@@ -435,6 +435,7 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
     at = {label: points[label] for label in plain_labels(points)}
     if len(at) < bound("cloud"):
         return None
+    # Without the outermost points, which need not be on the person.
     extent = np.ptp(np.percentile(list(at.values()), (5, 95), axis=0), axis=0)
     found = []
     for up in (
@@ -461,6 +462,7 @@ def clear_axis(direction: Array) -> Array | None:
 def turn_to(up: Array) -> Array:
     """Return the rotation (3, 3) whose third row is a coordinate axis ``up``; its first row is x where possible."""
     first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    # Right-handed: first x (up x first) = up. Adding zero makes no -0.0.
     return np.stack([first, np.cross(up, first), up]) + 0.0
 
 

@@ -5,17 +5,15 @@ Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Vi
 types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.plates.corners import corners_in_lab, half_sides, plate_axes
 from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS, PlateParameters
 from biodance.records import Array, Mask, runs
-from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE
+from biodance.settings import TOUCH_FORCE
 
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
 EDGE = 0.02  # m by which a sensor or a centre of pressure may lie beyond the edge
@@ -23,11 +21,6 @@ FARTHEST_PRESSURE = 1.5  # m: a centre of pressure farther away has no meaning
 _FARTHEST_ORIGIN, _CLOSEST_SENSORS = 2.0, 0.05  # m
 _VERTICAL = {3: (4, 5, 6, 7), 6: (2, 5, 8, 11), 7: (4, 5, 6, 7)}
 """Columns (after the calibration matrix) whose sum is the force along the plate's z; column 2 for other TYPEs."""
-_SCALE_OFF = 0.5
-"""Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
-_SCALE_RIGHT = 0.15
-"""Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
-_SOMEBODY_ON = 0.3  # share of the largest total force from which on somebody stands on the plates
 _LOADED, _CONTACT = 0.05, 0.1  # share of the peak from which on a plate is loaded; s over which it must be
 _BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
 _NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
@@ -40,6 +33,13 @@ _DEAD, _LONG = 1.5, 0.5
 _FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
+SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
+_NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
+_UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
+_STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
+_SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
+_UNITS = {"m": 1.0, "mm": 0.001}
+_FOOT = 0.15  # m that a foot reaches beyond its markers and centres of pressure
 FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
 
 
@@ -91,48 +91,13 @@ class PlateReading:
         return loaded_samples(self.sensor, self.rate)
 
 
-def decode_plates(
-    raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
-) -> tuple[list[PlateReading], dict[int, str], tuple[str, ...]]:
-    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
-
-    Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
-    not applied where with it the plates carry less than half or more than twice the weight, and without it, within
-    15 %, all of it.
-
-    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab, ``mass`` kg is the
-    person's (None = not known). Return the readings of the plates that make sense; by number why others are not used,
-    with the value and what would be legal; and what was decided about the scale of the whole file.
-    """
-    done, lost = _decode_each(raw, plates, metres, turn)
-    used = [column for reading in done for column in reading.plate.channels]
-    if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
-        return done, lost, ()
-    gain, share = raw.layout.gain[used], _weight_share(done, mass)
-    if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
-        return done, lost, ()
-    # A scale of zero, or none, cannot be undone.
-    scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
-    # Undoes (stored - offset) scale.
-    stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
-    plain, lost_plain = _decode_each(stored, plates, metres, turn)
-    whole = _weight_share(plain, mass)
-    if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
-        return done, lost, ()
-    said = (
-        f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
-        f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
-        f"ANALOG:SCALE, or export the file again."
-    )
-    return plain, lost_plain, (said,)
-
-
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
     """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
     four = plate.type in FOUR_SENSORS
     fits = []
     for unit in dict.fromkeys((metres, 0.001, 1.0)):
         x, y, depth = np.abs(plate.origin * unit)
+        # Four sensors lie inside the outline and apart; one may lie beside it, as treadmills have it.
         beside = np.array([x, y])
         inside = bool((beside >= _CLOSEST_SENSORS).all() and (beside <= half + EDGE).all())
         if depth <= DEEPEST and max(x, y) <= _FARTHEST_ORIGIN and (inside or not four):
@@ -150,20 +115,7 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
     )
 
 
-def _decode_each(
-    raw: RawC3d, plates: Sequence[PlateParameters], metres: float, turn: Array
-) -> tuple[list[PlateReading], dict[int, str]]:
-    """Return the readings of the plates that make sense, and by number why others are refused."""
-    readings, lost = [], {}
-    for plate in plates:
-        try:
-            readings.append(_decode(raw, plate, metres, turn))
-        except TrialRefused as error:
-            lost[plate.number] = str(error)
-    return readings, lost
-
-
-def _decode(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array) -> PlateReading:
+def decode_plate(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array) -> PlateReading:
     """Return the reading of one plate; TrialRefused where corners or ORIGIN make no sense, or no sample is known."""
     corners, corners_said = corners_in_lab(plate.corners, metres=metres, turn=turn)
     half = half_sides(corners)
@@ -254,6 +206,7 @@ def _written(vertical: Array, zero: tuple[int, int] | None) -> tuple[Baseline | 
     first, last = zero
     if not 1 <= first <= last <= vertical.size:
         return None, f"ZERO is {first} {last}, which names no samples."
+    # ZERO counts samples from 1 and names the last one, too.
     level = float(vertical[first - 1 : last].mean())
     if not is_unloaded(level, vertical):
         return None, f"ZERO names samples {first}-{last}, but the plate is loaded there ({level:.0f} N)."
@@ -371,14 +324,159 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
     return lasting & (np.abs(wrench[:, 2]) >= threshold)
 
 
-def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
-    """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
-    total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
-    # Somebody stands there, at a share of the largest total.
-    loaded = total >= _SOMEBODY_ON * total.max()
-    return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
-
-
 def left_out_said(number: int, why: TrialRefused | str) -> str:
     """Return the sentence that a plate is not used."""
     return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
+
+
+def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and
+    what was decided.
+
+    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the
+    lab. Corners that have an impossible size in the file's unit are taken as m or mm where that gives a legal one.
+
+    Raises
+    ------
+    TrialRefused
+        The corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is steeper
+        than 45 degrees.
+    """
+    if not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
+        raise TrialRefused(
+            f"CORNERS hold values up to {np.abs(corners).max():.3g}, which is no place in a laboratory. Enter the "
+            f"corners again."
+        )
+    if np.ptp(corners, axis=0).max() == 0:
+        raise TrialRefused(f"all four CORNERS are {_point(corners[0])}. Enter the corners in the lab frame.")
+    unit, decisions = _unit(corners, metres)
+    # Points are rows: R p becomes p R'.
+    lab = corners @ turn.T * unit
+    _refuse_disorder(lab)
+    _refuse_size(lab, corners)
+    gap, skew = _gap(lab), _skew(lab)
+    if gap > _NOT_CLOSED or skew > _NOT_CLOSED:
+        raise TrialRefused(
+            f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by "
+            f"{1000 * skew:.0f} mm at a side's end (legal: {1000 * _NOT_CLOSED:.0f} mm). Measure the corners again."
+        )
+    if gap > _CROOKED or skew > _CROOKED:
+        decisions.append(
+            f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used."
+        )
+    axes = plate_axes(lab)
+    if abs(axes[2, 2]) < _STEEPEST:
+        raise TrialRefused(
+            f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). "
+            "Check corners and lab axes."
+        )
+    return lab, tuple(decisions)
+
+
+def is_rectangle(corners: Array) -> bool:
+    """Return whether corners (4, 3), in any unit and axes, make a closed rectangle with sides of similar length."""
+    if not np.isfinite(corners).all():
+        return False
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(sides, axis=1)
+    # In any unit: as far apart as the sides of plates can be, and opposite ones against each other.
+    if not lengths.min() * LONGEST_SIDE > SHORTEST_SIDE * lengths.max() > 0 or sides[0] @ sides[2] >= 0:
+        return False
+    return max(_gap(corners), _skew(corners)) < _UNEVEN * float(lengths.min())
+
+
+def plate_axes(corners: Array) -> Array:
+    """Return lab_R_plate (3, 3) from corners (4, 3) in the order +x+y, -x+y, -x-y, +x-y of the plate axes.
+
+    x and y are the mean directions of opposite sides, made orthogonal without preferring one; z = x × y (it points down
+    on most plates).
+    """
+    x, y = _along_sides(corners)
+    # Polar factor U V' of the two directions: the nearest orthonormal pair, both turned alike.
+    u, _, v = np.linalg.svd(np.column_stack([x / np.linalg.norm(x), y / np.linalg.norm(y)]), full_matrices=False)
+    x, y = (u @ v).T
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def _along_sides(corners: Array) -> Array:
+    """Return (2, 3) m twice the mean opposite sides, along the plate's x and y."""
+    a, b, c, d = corners
+    return np.array([a + d - b - c, a + b - c - d])
+
+
+def half_sides(corners: Array) -> Array:
+    """Return half the side lengths (2,) m along the plate's x and y."""
+    # Twice the mean side, and half of that: a quarter.
+    return np.linalg.norm(_along_sides(corners), axis=1) / 4
+
+
+def around_pressures(points: Array, height: float) -> Array:
+    """Return the corners (4, 3) m around ``points`` (n, 2 or more) m with room for a foot, at a ``height`` m;
+    counter-clockwise seen from above.
+    """
+    (x0, y0), (x1, y1) = np.nanmin(points, axis=0)[:2] - _FOOT, np.nanmax(points, axis=0)[:2] + _FOOT
+    return np.array([[x1, y1, height], [x0, y1, height], [x0, y0, height], [x1, y0, height]])
+
+
+def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
+    """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    fits = [
+        name
+        for name, unit in _UNITS.items()
+        if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE
+    ]
+    if any(np.isclose(_UNITS[name], metres) for name in fits) or len(fits) != 1:
+        return metres, []
+    said = (
+        f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the "
+        "only unit that fits a plate."
+    )
+    return _UNITS[fits[0]], [said]
+
+
+def _refuse_disorder(lab: Array) -> None:
+    """Refuse four corners whose sides cross."""
+    sides = lab - np.roll(lab, -1, axis=0)
+    # Round a simple outline both pairs of opposite sides run against each other.
+    if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
+        return
+    for order, which in _SWAPS.items():
+        if _gap(lab[list(order)]) < _NOT_CLOSED:
+            raise TrialRefused(
+                f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
+                "is +x+y, -x+y, -x-y, +x-y of the plate axes. Correct FORCE_PLATFORM:CORNERS."
+            )
+    raise TrialRefused(
+        f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the "
+        "corners in the order +x+y, -x+y, -x-y, +x-y of the plate axes."
+    )
+
+
+def _refuse_size(lab: Array, corners: Array) -> None:
+    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
+    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
+        raise TrialRefused(
+            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
+            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
+            "POINT:UNITS."
+        )
+
+
+def _gap(corners: Array) -> float:
+    """Return by how much opposite sides differ."""
+    # a - b + c - d: zero in a parallelogram, whose diagonals halve each other.
+    return float(np.linalg.norm(corners[0] - corners[1] + corners[2] - corners[3]))
+
+
+def _skew(lab: Array) -> float:
+    """Return how far the end of a side is off at most, m, because the angle at its corner is not a right one."""
+    sides = np.roll(lab, -1, axis=0) - lab
+    lengths = np.linalg.norm(sides, axis=1)
+    cosines = np.abs(np.sum(sides * np.roll(sides, -1, axis=0), axis=1)) / (lengths * np.roll(lengths, -1))
+    # The cosine of a corner's angle is the sine of what it lacks to a right one; times the shorter side.
+    return float((cosines * np.minimum(lengths, np.roll(lengths, -1))).max())
+
+
+def _point(p: Array) -> str:
+    return "(" + ", ".join(f"{c:.4g}" for c in p) + ")"

@@ -7,14 +7,14 @@ Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform 
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from biodance.errors import TrialRefused, did_you_mean
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.plates.corners import NOTHING_TOLD, ToldPlate
 from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
@@ -46,6 +46,58 @@ MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _
 }
 """N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
 _TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
+
+
+C3D_ONLY = ("type", "channels", "sensitivity", "origin_m")
+"""What of a plate only a reader of its channels can follow."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToldPlate:
+    """What is said of one plate; None = nothing, the file decides.
+
+    ``corners`` (4, 3) m in the lab frame (z up, as `inspect` shows them), in the order +x+y, -x+y, -x-y, +x-y of the
+    plate axes; ``type`` of the C3D standard; ``channels`` labels, or numbers from 1; ``sensitivity`` (rows, channels)
+    N and N·m per unit of a channel as the file gives it; ``origin`` (3,) m from the sensor to the centre of the
+    surface, plate axes; ``foot`` that stands on it, "" = as the markers show; ``use`` False leaves the plate out.
+    """
+
+    corners: Array | None = None
+    type: int | None = None
+    channels: tuple[str | int, ...] | None = None
+    sensitivity: Array | None = None
+    origin: Array | None = None
+    foot: str = ""
+    use: bool = True
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of session.toml that say something of what the plate measures and where."""
+        said = {
+            "corners_m": self.corners,
+            "type": self.type,
+            "channels": self.channels,
+            "sensitivity": self.sensitivity,
+            "origin_m": self.origin,
+            "foot": self.foot or None,
+        }
+        return tuple(key for key, value in said.items() if value is not None)
+
+    @property
+    def sentence(self) -> str:
+        """What is taken from session.toml, for the history; "" for nothing."""
+        return f"{', '.join(self.keys)} as session.toml says." if self.keys else ""
+
+
+NOTHING_TOLD = ToldPlate()
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What the analyst says to readers of forces: ``plates`` by name, declared body ``mass`` kg or None."""
+
+    plates: Mapping[str, ToldPlate] = field(default_factory=lambda: MappingProxyType({}))
+    mass: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,22 +11,32 @@ from typing import NamedTuple
 
 import numpy as np
 
+from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.upright import movement, steady_mass
-from biodance.lab.plates.corners import ToldPlate
 from biodance.lab.plates.decode import (
     FOOT_HEIGHT,
     LARGEST_SHARE,
     PlateReading,
     block_means,
-    decode_plates,
+    decode_plate,
     left_out_said,
+    plate_axes,
 )
-from biodance.lab.plates.parameters import POUND, declared_plates
+from biodance.lab.plates.parameters import (
+    C3D_ONLY,
+    NOTHING_TOLD,
+    POUND,
+    PlateParameters,
+    Told,
+    ToldPlate,
+    declared_plates,
+)
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
-from biodance.records import Array, Defect, Markers, Plate, Wrench
-from biodance.records.attention import WrongWeight
-from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
+from biodance.records import Array, Defect, Markers, Plate, Trial, Wrench, grouped
+from biodance.records.attention import Doubt, WrongWeight
+from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE, CheckLimits, StandingRules
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 _AROUND = 0.05  # m by which a sole reaches beyond its markers
 
@@ -45,6 +55,70 @@ coarse converter does at rest, all of them repeat it four times in six of a hund
 """
 
 
+_SCALE_OFF = 0.5
+"""Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
+_SCALE_RIGHT = 0.15
+"""Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
+_SOMEBODY_ON = 0.3  # share of the largest total force from which on somebody stands on the plates
+
+
+def decode_plates(
+    raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
+) -> tuple[list[PlateReading], dict[int, str], tuple[str, ...]]:
+    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
+
+    Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
+    not applied where with it the plates carry less than half or more than twice the weight, and without it, within
+    15 %, all of it.
+
+    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab, ``mass`` kg is the
+    person's (None = not known). Return the readings of the plates that make sense; by number why others are not used,
+    with the value and what would be legal; and what was decided about the scale of the whole file.
+    """
+    done, lost = _decode_each(raw, plates, metres, turn)
+    used = [column for reading in done for column in reading.plate.channels]
+    if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
+        return done, lost, ()
+    gain, share = raw.layout.gain[used], _weight_share(done, mass)
+    if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
+        return done, lost, ()
+    # A scale of zero, or none, cannot be undone.
+    scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
+    # Undoes (stored - offset) scale.
+    stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
+    plain, lost_plain = _decode_each(stored, plates, metres, turn)
+    whole = _weight_share(plain, mass)
+    if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
+        return done, lost, ()
+    said = (
+        f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
+        f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
+        f"ANALOG:SCALE, or export the file again."
+    )
+    return plain, lost_plain, (said,)
+
+
+def _decode_each(
+    raw: RawC3d, plates: Sequence[PlateParameters], metres: float, turn: Array
+) -> tuple[list[PlateReading], dict[int, str]]:
+    """Return the readings of the plates that make sense, and by number why others are refused."""
+    readings, lost = [], {}
+    for plate in plates:
+        try:
+            readings.append(decode_plate(raw, plate, metres, turn))
+        except TrialRefused as error:
+            lost[plate.number] = str(error)
+    return readings, lost
+
+
+def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
+    """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
+    total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
+    # Somebody stands there, at a share of the largest total.
+    loaded = total >= _SOMEBODY_ON * total.max()
+    return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
+
+
 def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
     """Return the readings of plates that are not dead, without constants where nobody steps on them; the dead ones."""
     alive, dead = [], []
@@ -54,6 +128,7 @@ def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> t
         others = (one for one, on in zip(readings, stood_on, strict=True) if on and not feet)
         loads = (float(np.abs(one.sensor[:, 2]).max()) for one in others)
         elsewhere = max((load for load in loads if load > _SOMEBODY), default=0.0)
+        # Its zero first: a plate that reads a small constant is no dead one.
         constant = _without_offset(reading, elsewhere)
         if why := _why_dead(constant, markers, elsewhere):
             said = left_out_said(reading.plate.number, why)
@@ -88,6 +163,7 @@ def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) 
     """Return why a plate is dead, "" for one alive: a constant load at one place though the person moves."""
     length = _CONTACT if elsewhere else 0.0  # noise is averaged only where feet tell that nobody is on the plate
     level, spread, wanders = _course(reading, length)
+    # Shares of the level: noise of a load grows with it, and moments over it are places.
     still = spread < _STUCK * abs(level) and wanders < _SAME_PLACE * abs(level)
     if markers is None or abs(level) <= TOUCH_FORCE or not still:
         return ""
@@ -218,3 +294,82 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
         if abs(mass / body_mass / factor - 1) <= _AS_POUNDS:
             return (f"{said}: the ratio is that of {meaning}. Check ANALOG:UNITS.",)
     return (WrongWeight(f"{said}: check the mass, the units, and whether a foot stood beside the plates."),)
+
+
+def as_told(trial: Trial, told: Told) -> Trial:
+    """Return a trial of a format whose plates come as wrenches (text, AMTI) with what the analyst says of them.
+
+    A plate of unknown place gets its corners; one that was placed in a frame of its own is moved there with what it
+    measured. What only the channels of a C3D file can follow is named in a warning.
+    """
+    plates, history, warnings = [], [], []
+    for plate in trial.plates:
+        said = told.plates.get(plate.name, NOTHING_TOLD)
+        if not said.use:
+            history.append(f"{plate.name} was left out, as session.toml says.")
+            continue
+        idle = [key for key in said.keys if key in C3D_ONLY]
+        if idle:
+            warnings.append(f"{plate.name}: {', '.join(idle)} of session.toml can be followed in C3D files only.")
+        done = plate if said.corners is None else _placed(plate, said.corners)
+        if used := ", ".join(key for key in said.keys if key not in idle):
+            taken = f"{used} as session.toml says."
+            done = replace(done, foot=said.foot, decisions=(*done.decisions, f"{taken[0].upper()}{taken[1:]}"))
+            history.append(f"{plate.name}: {taken}")
+        plates.append(done)
+    history, warnings = [*trial.history, *history], [*trial.warnings, *warnings]
+    return replace(trial, plates=tuple(plates), history=tuple(history), warnings=tuple(warnings))
+
+
+def _placed(plate: Plate, corners: Array) -> Plate:
+    """Return the plate at ``corners`` (4, 3) m."""
+    if not plate.placed:
+        return replace(plate, corners=corners, placed=True)
+    turn = plate_axes(corners) @ plate_axes(plate.corners).T
+    local = wrench_about_point(plate.wrench.value, plate.centre)
+    # Both vectors turn about the plate's own centre.
+    turned = np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T])
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(turned, corners.mean(axis=0)))
+    return replace(plate, corners=corners, wrench=wrench, zero=turn @ plate.zero)
+
+
+_MOVED = 0.05
+"""m between two trials from which on the plate was another one, or moved: nearly three times what the feet
+leave open in two (0.013 m each)."""
+
+
+def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+    """Return the trials with every plate that was put by the feet (``Plate.put``) at the median of what they say, and
+    notes: a plate does not move between the trials of one visit, while people lean otherwise in each.
+    """
+    plates = (plate for trial in trials for plate in trial.plates)
+    puts = grouped((plate.name, plate.put) for plate in plates if plate.put is not None)
+    place, notes = {}, list[str]()
+    for name, found in puts.items():
+        apart = float(np.ptp(found, axis=0).max())
+        if apart > _MOVED:
+            notes.append(
+                Doubt(
+                    f"{name} would lie up to {1000 * apart:.0f} mm elsewhere in another trial by where the feet stand: "
+                    "each trial keeps its own place",
+                    f"Give corners_m in [plates.{name}] of session.toml.",
+                )
+            )
+        elif len(found) > 1:
+            place[name] = np.median(found, axis=0)
+            x, y = place[name]
+            notes.append(
+                f"{name} was put at ({x:.3f}, {y:.3f}, 0) m in all trials, the median of what the feet of "
+                f"{len(found)} say, which are up to {1000 * apart:.0f} mm apart."
+            )
+    return [replace(trial, plates=tuple(_moved(plate, place) for plate in trial.plates)) for trial in trials], notes
+
+
+def _moved(plate: Plate, place: dict[str, Array]) -> Plate:
+    """Return the plate, with its wrench, at its ``place``."""
+    if plate.put is None or plate.name not in place:
+        return plate
+    # On the ground: only x and y were put.
+    shift = np.array([*(place[plate.name] - plate.put), 0.0])
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(plate.wrench.value, shift))
+    return replace(plate, corners=plate.corners + shift, wrench=wrench, put=place[plate.name])

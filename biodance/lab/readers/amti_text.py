@@ -8,8 +8,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import COMMAS_READ, parse_number, plain_table, read_bytes, read_text, sha256, with_points
-from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
-from biodance.lab.plates.decode import DEEPEST, find_baseline, loaded_samples
+from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE, find_baseline, loaded_samples
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.sense import gravity_sign, sensor_below, wrench_in_lab
 from biodance.lab.readers import head_text
@@ -134,6 +133,7 @@ def _rate(values: Array, columns: list[str]) -> float | None:
         return None
     time = values[:, columns.index("time_s")]
     step = (time[-1] - time[0]) / (time.size - 1)
+    # Every time against its place on equal steps from the first to the last.
     even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(_EVEN * step, 0.0005)
     return round(1 / step, 3) if even else None
 

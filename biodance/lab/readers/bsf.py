@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import LARGEST_NUMBER, read_bytes, sha256
-from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
-from biodance.lab.plates.decode import DEEPEST
+from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import INCH, POUND
 from biodance.lab.readers.amti_text import PLATE_UPRIGHT, amti_plate
 from biodance.records import Array, Role, Source, Trial
@@ -63,6 +62,7 @@ def _load(block: NDArray[Any], header: Any, version: int, where: str) -> Array:
                 f"{where} holds ADC counts but a calibration value is 0 or no number. Enter the calibration in "
                 f"NetForce and save again."
             )
+        # Counts over counts a volt and gain: volts of the bridge; the sensitivity is µV per volt of excitation a unit.
         factor = _MICROVOLT / product
     return block.astype(float) * factor * _IMPERIAL
 

@@ -11,8 +11,7 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.markers.time_axis import time_axis
 from biodance.lab.plain_text import read_bytes, sha256
-from biodance.lab.plates.corners import around_pressures
-from biodance.lab.plates.decode import find_baseline
+from biodance.lab.plates.decode import around_pressures, find_baseline
 from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, read_mot
 from biodance.lab.readers import head_text
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
@@ -204,6 +203,7 @@ def _zeroed(rows: _Rows, time: Array, turn: Array) -> _Rows:
     if window.stop <= window.start or np.abs(reads := rows.force[empty].mean(axis=0)).max() < _READS:
         return rows
     torque = np.median(rows.torque[empty], axis=0)
+    # A torque that noise alone would give is no zero.
     steady = np.abs(torque) > 3 * rows.torque[empty].std(axis=0)
     said = (
         f"Zero: nobody is on the plate in rows {empty.start + 1}-{empty.stop}; what they read on average "

@@ -25,9 +25,8 @@ from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
 from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
 from biodance.lab.plain_text import Cells, clean_label, header_of, is_parquet, read_bytes, read_cells, sha256
-from biodance.lab.plates.corners import C3D_ONLY, NOTHING_TOLD, Told, around_pressures, plate_axes
-from biodance.lab.plates.decode import find_baseline
-from biodance.lab.plates.parameters import FORCE, MOMENT, channel_groups, plain_unit
+from biodance.lab.plates.decode import around_pressures, find_baseline, plate_axes
+from biodance.lab.plates.parameters import C3D_ONLY, FORCE, MOMENT, NOTHING_TOLD, Told, channel_groups, plain_unit
 from biodance.lab.plates.read import PlatesRead
 from biodance.lab.readers import head_text
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Role, Source, Trial, Wrench
@@ -200,6 +199,7 @@ def _stamps(cells: Cells, columns: TableColumns, path: Path) -> tuple[Array, lis
     if unit not in _SECONDS:
         step = float(np.median(np.diff(raw))) if raw.size > 1 else 0.0
         whole = step >= 1 and bool((raw == np.rint(raw)).all())
+        # Up to 1.5 a step is in s, up to 1500 in ms, and so on.
         factors = [_IN_SECONDS * 1000**k for k in range(3)]
         unit = "ms" if whole and step < factors[0] else list(_SECONDS)[int(np.searchsorted(factors, step))]
         by = f"steps of {step:.4g}"
@@ -287,6 +287,7 @@ def loads_of(
     moment = plain_unit(next((units[k] for group in groups for k in group[3:] if units[k]), ""))
     by_label = ", as the labels say" if force in FORCE and moment in MOMENT else ""
     total = np.sum([values[:, list(group[:3])] for group in groups], axis=0)
+    # The mean force of all plates together is the weight, whichever axis points up.
     size = float(np.linalg.norm(np.nanmean(total, axis=0)))
     if force not in FORCE:
         force = next((unit for unit in ("n", "kn") if _PERSON[0] <= size * FORCE[unit] <= _PERSON[1]), "n")
@@ -406,6 +407,7 @@ def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     foot = np.where(down[..., None], pressed, np.nan)
     # Both down: between them; one down: under it.
     middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
+    # As high as ever: the mean of all markers while both feet are down.
     both = down.all(axis=0)
     height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
     upright = height > np.nanpercentile(height[both], 95) - _SINKS if both.any() else both

@@ -308,6 +308,7 @@ def _equal_steps(
         return (raw, xyz), []
     duration = raw[-1] - raw[0]
     for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
+        # Places by the frame numbers, else by the times at the declared rate: each row near its place.
         step = duration / place[-1] if place[-1] > 0 else np.inf
         near = np.abs(raw - raw[0] - step * place) < 0.25 * step + _TIME_COLUMN_ROUNDING
         if np.all(np.diff(place) > 0) and near.all():
@@ -317,6 +318,7 @@ def _equal_steps(
         return (markers.time, markers.xyz), [axis.said, *unseen]
     warnings = []
     rate = declared
+    # A rounded time column leaves the rate open by its rounding over the duration.
     if abs(1 / (step * declared) - 1) > _TIME_COLUMN_ROUNDING / duration + 1e-6:
         rate = 1 / step
         warnings.append(f"DataRate says {declared:g} Hz, the time column {rate:.6g} Hz; the time column was used.")

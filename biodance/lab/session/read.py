@@ -12,7 +12,7 @@ from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.lab.markers.upright import is_still, movement
-from biodance.lab.plates.corners import one_place
+from biodance.lab.plates.read import one_place
 from biodance.lab.readers import Reader, extensions, read_trial
 from biodance.lab.session import recordings
 from biodance.lab.session.archive import visit_date

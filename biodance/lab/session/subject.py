@@ -72,6 +72,7 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     if not told:
         return math.nan, math.nan, ""
     sds = np.array(spread)
+    # Inverse variances, as shares of one.
     weight = sds**-2 / (sds**-2).sum()
     # the sd of the mean has the correlation of the landmarks in it, though the weights have not
     covariance = np.outer(sds, sds) * (_ALIKE + (1 - _ALIKE) * np.eye(len(sds)))
@@ -253,6 +254,7 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
             "The body mass was not declared, and nobody stands still on the plates. Set mass_kg in session.toml."
         )
         return mass
+    # Body mass index: mass over the square of the stature.
     mass = round(_MIDDLE_INDEX * stature**2, 1)
     notes.append(
         f"The body mass is not known: not declared, and no plate was recorded. {mass:g} kg were taken, as people of "

@@ -20,7 +20,7 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.plain_text import write_whole
-from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.decode import plate_axes
 from biodance.lab.session.entries import plate_lines
 from biodance.lab.session.file import FILES
 from biodance.lab.session.read import read_session
@@ -247,10 +247,12 @@ def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[Pl
     time = plates[0].wrench.time
     many = max(1, round(plates[0].wrench.rate / markers.rate))
     step = 1.0 / markers.rate
+    # A frame is kept where all its samples lie within what the plates recorded.
     kept = np.flatnonzero((markers.time >= time[0]) & (markers.time + (many - 1) / many * step <= time[-1]))
     if kept.size < 2:
         raise SessionRefused("Markers and plates share no time, so there is nothing to write.")
     seen = Markers(markers.names, markers.time[kept], markers.xyz[kept])
+    # Every frame and the samples between it and the next.
     fine = (seen.time[:, None] + step / many * np.arange(many)).ravel()
     recordings = []
     for plate in plates:
