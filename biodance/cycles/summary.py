@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from itertools import chain
-from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -212,14 +211,6 @@ class LeftOutBecause(Enum):
     """The person turned: its angles are not those of straight walking."""
 
 
-class _OfCycle(Protocol):
-    @property
-    def cycle(self) -> Cycle: ...
-
-
-_Of = TypeVar("_Of", bound=_OfCycle)
-
-
 @dataclass(frozen=True)
 class LeftOutCurve:
     """A ``quantity`` ("" = all of them, "loads" = moments, powers and ground reaction) of a ``cycle`` that counts in no
@@ -380,9 +371,13 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     """
     cycles = tuple(one for trial in trials for one in trial.cycles if one.kind == kind)
     turned = _turned(trials) if kind == "gait" else []
-    curves = _counted((trial.curves for trial in trials), kind, turned)
-    values = _counted(((*trial.strides, *trial.lifts) for trial in trials), kind, turned)
-    theirs = _counted((trial.file_curves for trial in trials), kind, turned)
+
+    def counts(one: CycleCurve | Stride) -> bool:
+        return one.cycle.kind == kind and one.cycle not in turned
+
+    curves = tuple(filter(counts, chain.from_iterable(trial.curves for trial in trials)))
+    values = tuple(filter(counts, chain.from_iterable((*trial.strides, *trial.lifts) for trial in trials)))
+    theirs = tuple(filter(counts, chain.from_iterable(trial.file_curves for trial in trials)))
     shared = [one for trial in trials for one in trial.shared if one.kind == kind and one not in turned]
     of_one = grouped(((one.quantity, one.side), one) for one in curves)
     spikes = [one for same in of_one.values() for one in _spikes(same)]
@@ -393,11 +388,6 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     )
     kept = tuple(one for one in curves if one not in spikes)
     return Repetitions(kind, cycles, kept, values, left_out, theirs)
-
-
-def _counted(some: Iterable[Iterable[_Of]], kind: str, turned: Sequence[Cycle]) -> tuple[_Of, ...]:
-    """Return what is of cycles of a ``kind``, without those of cycles that were ``turned``."""
-    return tuple(one for one in chain.from_iterable(some) if one.cycle.kind == kind and one.cycle not in turned)
 
 
 def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
