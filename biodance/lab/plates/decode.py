@@ -1,5 +1,6 @@
 """One force plate from its raw channels to the wrench about its sensor, in the order in which it happens: corners,
-origin, gaps, units, zero, wrench. In plate axes and with the recorded sign; `sense` decides the directions.
+origin, gaps, units, zero, wrench. In plate axes and with the recorded sign; `sense` decides the directions. At the end
+its outline: whether it is a plate, and which way its axes point.
 
 Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Visual3D documentation, force platform
 types 5-7; Kistler 9287 manual (moments of an eight-channel plate).

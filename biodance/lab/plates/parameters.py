@@ -1,5 +1,5 @@
 """What a C3D file says of its force plates (group FORCE_PLATFORM, labels and units of the analog channels), and what
-session.toml says instead; no sample is looked at yet.
+session.toml says instead (`ToldPlate`), which comes first; no sample is looked at yet.
 
 Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform types 5-7; Kistler 9287C manual, 8.4.3
 (FPCOPPOLY).

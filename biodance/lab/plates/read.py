@@ -2,7 +2,8 @@
 decision is a sentence.
 
 parameters (what the file says) -> decode (channels to wrench, in plate axes) -> what is no measurement ->
-sense (directions, and the wrench in the lab).
+sense (directions, and the wrench in the lab). Plates of other formats come as wrenches and are placed as session.toml
+says (`as_told`); those that feet have placed lie at one place in all trials (`one_place`).
 """
 
 from collections.abc import Mapping, Sequence

@@ -152,7 +152,8 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     warnings += timing
     history = [*[COMMAS_READ] * commas, *short, f"Coordinates were read in {unit} and turned into m.", *unseen]
     # by the labels of high and low markers, else by where the cloud is tall
-    up, known = axis_to_head(Markers(tuple(names), time, xyz), recognise(names)), recognise(names)
+    known = recognise(names)
+    up = axis_to_head(Markers(tuple(names), time, xyz), known)
     if body_is_tall_along_z(xyz) if up is None or up[0] else bool(up[2]):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
