@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
+from biodance.lab.c3d.subject import subjects_in
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.markers.signals import report_gaps
@@ -116,7 +117,7 @@ def inspect_file(
         "marker_set": trial.worn or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
         "gaps_percent": gap,
-        "subjects": _subjects(path),
+        "subjects": list(subjects_in(path)) if ".c3d" in reader_of(path).EXTENSIONS else [],
         "plates": plates,
         "mean_vertical_n": float(sum(as_read)) if as_read else None,
         "mass_on_plates_kg": standing_mass(trial),
@@ -153,16 +154,6 @@ def _refused(path: Path, reason: str) -> dict[str, Any]:
     """Return the record of a file that cannot be read, with all keys."""
     empty: dict[str, Any] = {name: [] for name in ("markers", "subjects", "plates", "history", "warnings")}
     return {**dict.fromkeys(_KEYS.split()), **empty, "file": str(path), "status": "refused", "reason": reason}
-
-
-def _subjects(path: Path) -> list[str]:
-    """Return the names of the people in a C3D file; none for the other formats, which hold none."""
-    if ".c3d" not in reader_of(path).EXTENSIONS:
-        return []
-    from biodance.lab.c3d.raw import read_raw
-    from biodance.lab.c3d.subject import subjects_of
-
-    return list(subjects_of(read_raw(path)))
 
 
 def _plate(plate: Plate) -> dict[str, Any]:

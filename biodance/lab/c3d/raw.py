@@ -228,7 +228,7 @@ def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, .
     return tuple(found)
 
 
-def _unlabelled(labels: Sequence[str]) -> tuple[int, ...]:
+def unlabelled(labels: Sequence[str]) -> tuple[int, ...]:
     """Return the columns without a name, or with the name that software gives to unlabelled trajectories (``*115``)."""
     return tuple(column for column, label in enumerate(labels) if _UNLABELLED.match(split_label(label)[1]))
 
@@ -279,7 +279,7 @@ class RawC3d:
     @cached_property
     def nameless(self) -> frozenset[int]:
         """The columns of points without a name (`_UNLABELLED`)."""
-        return frozenset(_unlabelled(self.labels))
+        return frozenset(unlabelled(self.labels))
 
 
 def read_raw(path: str | Path) -> RawC3d:
@@ -366,7 +366,7 @@ def _smells(
     numbers: _Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
 ) -> tuple[tuple[str, ...], str]:
     """Have suspicious numbers judged by a second reader; return its judgement and who agrees, or refuse."""
-    no_markers = {*model_outputs(labels, parameters), *_unlabelled(labels)}
+    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     markers = [column for column in range(layout.points) if column not in no_markers]
     points, leaps = numbers[0], 0
     with suppress(FileRefused):  # where the unit is not known, no distance is

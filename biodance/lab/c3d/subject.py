@@ -15,7 +15,7 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
-from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label
+from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label, unlabelled
 from biodance.records import Array, FootEvent, grouped
 
 _MUSCLES: Mapping[str, str] = {
@@ -194,12 +194,17 @@ show no pelvis with two legs.
 """
 
 
-def subjects_of(raw: RawC3d) -> tuple[str, ...]:
-    """Return the names of the subjects in a file: label prefixes (`_people_of`), else SUBJECTS:NAMES."""
-    prefixes = [prefix for i, (prefix, _) in enumerate(raw.split_labels) if i not in raw.nameless]
-    if any(prefixes):
-        return _people_of(prefixes)
-    return tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
+def subjects_in(path: Path) -> tuple[str, ...]:
+    """Return the names of the subjects in a C3D file, of which no point is read; FileRefused as of `read_raw`."""
+    _, parameters, layout, _ = open_c3d(path)
+    return subjects_of(point_labels(parameters, layout), parameters)
+
+
+def subjects_of(labels: Sequence[str], parameters: Parameters) -> tuple[str, ...]:
+    """Return the names of the subjects in a file: prefixes of its labels (`_people_of`), else SUBJECTS:NAMES."""
+    nameless = unlabelled(labels)
+    prefixes = [split_label(label)[0] for i, label in enumerate(labels) if i not in nameless]
+    return _people_of(prefixes) if any(prefixes) else tuple(filter(None, texts(parameters, "SUBJECTS", "NAMES")))
 
 
 def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
@@ -256,7 +261,7 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
             f"{raw.path}: holds markers of {len(prefixes)} subjects ({', '.join(prefixes)}) and none was chosen. "
             "Name one of them as the subject."
         )
-    known = subjects_of(raw)
+    known = subjects_of(raw.labels, raw.parameters)
     chosen = subject if subject is not None else (prefixes[0] if prefixes else None)
     if chosen is None:
         return columns

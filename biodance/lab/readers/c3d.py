@@ -15,6 +15,7 @@ from biodance.lab.markers.sets import MarkerSet, recognise
 from biodance.lab.markers.upright import axis_to_head, clear_axis, extents, turn_to
 from biodance.lab.plates.decode import is_rectangle
 from biodance.lab.plates.parameters import Told
+from biodance.lab.plates.read import read_plates
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
 
 NAME = "C3D"
@@ -69,8 +70,6 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     >>> biodance.read_c3d("visit/static.c3d", role="static").markers
     Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
-    from biodance.lab.plates.read import read_plates
-
     raw = read_raw(path)
     poses = poses_only(raw)
     if poses and not raw.analog.size:
