@@ -81,7 +81,8 @@ def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, ste
     angles = q[:, q.shape[1] - joints :]
     np.clip(angles, problem.chain.lower, problem.chain.upper, out=angles)
     found = Minimum(q, np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
-    newton.minimise_frames(problem.chain, problem.xyz, problem.weight, frames, found, problem.tolerance, steps)
+    weight = np.ascontiguousarray(problem.weight)  # one type for the compiled code
+    newton.minimise_frames(problem.chain, problem.xyz, weight, frames, found, problem.tolerance, steps)
     return found
 
 
