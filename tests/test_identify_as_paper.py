@@ -15,7 +15,7 @@ from biodance.cli import run
 from biodance.identification.paper_programme import inequalities
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import by_paper
+from biodance.pipeline.session import by_paper, identified
 from biodance.report.pages.identification import identification_section
 
 
@@ -63,7 +63,13 @@ def test_where_nothing_was_identified_there_is_nothing_to_compare():
     assert by_paper(nothing) is nothing
 
 
-def test_the_command_writes_the_same_form_for_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_command_writes_the_same_form_for_both(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """What the diagnosis takes off before (`test_proven_corrections`) is not asked."""
+    monkeypatch.setattr(
+        "biodance.pipeline.diagnosis.diagnosed_and_corrected", lambda result, **_: (identified(result), None)
+    )
     folder = hidden(tmp_path / "S01", trials=("static", "move_1", "squat_1"))
     assert run(["identify", str(folder), "--method", "paper", "--out", str(tmp_path / "out"), "--json"]) in (0, 1)
     found = json.loads(capsys.readouterr().out)
