@@ -3,6 +3,7 @@
 import itertools
 import re
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from example_results import LEFT, VERDICTS
@@ -52,6 +53,7 @@ def named(effect: str, size: float, others: tuple[Alias, ...]) -> Finding:
     return Finding(effect, target, parameters, (Alias(effect, target, 30.0), *others), 0.9)
 
 
+@cache
 def found() -> list[Diagnosis]:
     """Return every named cause alone, in a set, among several and beside what is left; every reason for which nobody
     can tell; every other verdict.
