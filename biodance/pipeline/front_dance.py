@@ -1,6 +1,4 @@
-"""What ``import biodance`` conducts before a visit: a dance to be recorded, or a laboratory to be simulated, with the
-designed dance performed by a virtual person.
-"""
+"""What is conducted before a visit: a dance to be recorded, or a laboratory to be simulated."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -14,26 +12,33 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import Phase
-from biodance.errors import BiodanceError, SessionRefused, UnknownName
+from biodance.errors import BiodanceError, SessionRefused, refuse_unknown
 from biodance.motion.dynamics import predict_wrench
-from biodance.records import SIDES, Array, Motion, Subject
+from biodance.records import SIDES, Array, Subject
 from biodance.spatial import zero_moment_point
-from biodance.virtual_lab.causes import Hidden, hide
-from biodance.virtual_lab.movement.performance import ARM, USUAL_PERFORMER, Performance, Performer, Shown, copy_dance
+from biodance.virtual_lab.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.movement.performance import (
+    ARM,
+    PERFORMERS,
+    USUAL_PERFORMER,
+    Performance,
+    Performer,
+    Shown,
+    copy_dance,
+)
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.movement.protocol import STAND, Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.simulate import write_visit
-from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, perform_in
+from biodance.virtual_lab.simulate import check_simulated, write_visit
+from biodance.virtual_lab.simulate import simulate_session as write_session
+from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
 if TYPE_CHECKING:
-    from biodance.dance.dance import Dance
     from biodance.dance.expectation import PerformanceScore
     from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance import DanceResult
     from biodance.pipeline.results import SessionResult
-    from biodance.virtual_lab.causes import Hidden
 
 
 _RATE = 100.0
@@ -51,9 +56,7 @@ _BENT = {
 
 
 def stretches(dance: Dance) -> tuple[Shown, ...]:
-    """Return the dance in stretches between the steps by which a foot changes its place; the steps themselves are not
-    recorded.
-    """
+    """Return the dance in stretches between the steps that change a foot's place, which are not recorded."""
     motion, groups = dance.motion(_RATE), [[0]]
     for p in range(1, len(dance.stances)):
         same = np.array_equal(dance.stances[p].ankle, dance.stances[p - 1].ankle)
@@ -61,35 +64,22 @@ def stretches(dance: Dance) -> tuple[Shown, ...]:
     out = []
     for number, group in enumerate(groups, start=1):
         if len(group) > 1:
-            mine = [
-                phase
-                for phase in dance.phases
-                if phase.posture in group and (phase.kind == "hold" or phase.posture > group[0])
-            ]
-            out.append(_shown(dance, motion, mine, f"dance_{number}"))
+            own = [phase for phase in dance.phases if phase.posture in group]
+            phases = [phase for phase in own if phase.kind == "hold" or phase.posture > group[0]]
+            rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
+            part, feet = motion.at(rows), phases[0].stance
+            raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
+            point = zero_moment_point(predict_wrench(dance.body, part).value)[:, :2]
+            out.append(Shown(f"dance_{number}", dance.body, part, feet.ankle, raised, point, feet.seat))
     return tuple(out)
 
 
-def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Shown:
-    rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
-    part = motion.at(rows)
-    raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
-    point = zero_moment_point(predict_wrench(dance.body, part).value)[:, :2]
-    feet = phases[0].stance
-    return Shown(name, dance.body, part, feet.ankle, raised, point, feet.seat)
-
-
 def _on_the_stool(dance: Dance, danced: tuple[Shown, ...]) -> tuple[Shown, ...]:
-    """Return what is recorded on a stool beside the dance: sitting still as the static trial, and the cards' second
-    round to validate on.
-    """
+    """Return what is recorded on a stool, too: sitting still (static), and a second round to validate on."""
     x = np.zeros((round(_SITS * _RATE) + 1, dance.chain.size))
     x[:, 2] = danced[0].seat
-    arms = {
-        f"{side}_{name}": a
-        for side in SIDES
-        for name, a in zip(ARM, np.radians(STAND.values[f"{side}_arm"]), strict=True)
-    }
+    stood = {side: zip(ARM, np.radians(STAND.values[f"{side}_arm"]), strict=True) for side in SIDES}
+    arms = {f"{side}_{name}": angle for side, pairs in stood.items() for name, angle in pairs}
     for name, angle in (_BENT | arms).items():
         x[:, ROOT + dance.body.joint_index(name)] = angle
     still = dance.chain.motion(np.arange(len(x)) / _RATE, x, *np.zeros((2, *x.shape)))
@@ -271,7 +261,6 @@ def verify_dance(
     >>> all(margin.worst >= 0 for margin in margins)
     True
     """
-    from biodance.dance.dance import Dance
     from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
@@ -339,12 +328,6 @@ def simulate(
     >>> sorted(path.name for path in folder.iterdir())
     ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
     """
-    from biodance.virtual_lab.causes import hide, parse_cause
-    from biodance.virtual_lab.movement.protocol import read_protocol
-    from biodance.virtual_lab.simulate import check_simulated
-    from biodance.virtual_lab.simulate import simulate_session as write_session
-    from biodance.virtual_lab.visit import FIRST_VISIT, LabVisit, draw_laboratory
-
     check_simulated(subject)
     hidden = tuple(parse_cause(text) for text in effects)
     if (protocol is None) == (dance is None):
@@ -352,31 +335,13 @@ def simulate(
     if dance is not None or protocol is None:
         if lab_seed is not None:
             raise BiodanceError("A laboratory of the family is for protocols. Give --protocol with --lab-seed.")
-        return _danced(subject, dance, Path(out), seed=seed, performer=performer, hidden=hidden)
-    plan, visit = read_protocol(protocol), FIRST_VISIT
-    if lab_seed is not None:
-        visit = LabVisit(laboratory=draw_laboratory(lab_seed))
+        refuse_unknown("performer", performer, PERFORMERS)
+        one = dance if isinstance(dance, Dance) else Dance.load(str(dance))
+        return simulate_dance(subject, one, Path(out), seed=seed, performer=PERFORMERS[performer], hidden=hidden)
+    plan = read_protocol(protocol)
+    visit = FIRST_VISIT if lab_seed is None else LabVisit(laboratory=draw_laboratory(lab_seed))
     visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
-
-
-def _danced(
-    subject: Subject,
-    dance: "Dance | str | Path | None",
-    out: Path,
-    *,
-    seed: int,
-    performer: str,
-    hidden: "tuple[Hidden, ...]",
-) -> Path:
-    """Write the visit of a person who performs a dance."""
-    from biodance.dance.dance import Dance
-    from biodance.virtual_lab.movement.performance import PERFORMERS
-
-    if performer not in PERFORMERS:
-        raise UnknownName.of("performer", performer, tuple(PERFORMERS))
-    one = dance if isinstance(dance, Dance) else Dance.load(str(dance))
-    return simulate_dance(subject, one, out, seed=seed, performer=PERFORMERS[performer], hidden=hidden)
 
 
 def virtual_subject(
@@ -412,7 +377,6 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     BiodanceError
         The dance is of another body, or nothing was recorded.
     """
-    from biodance.dance.dance import Dance
     from biodance.dance.expectation import score_performance
     from biodance.dance.visit_log import read_visit_logs
     from biodance.pipeline.identification import FITTED_ROLES

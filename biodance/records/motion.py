@@ -18,18 +18,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Encoders(Sampled):
-    """Joint angles over time, on the robot's own clock.
-
-    Parameters
-    ----------
-    time : array_like
-        (T,) s.
-    joints : tuple of str
-        (n) names.
-    angle : array_like
-        (T, n) rad.
-    notes : tuple of str
-        What was decided on reading.
+    """Joint angles over ``time`` (T,) s, on the robot's own clock: ``angle`` (T, n) rad of ``joints`` (n); ``notes`` on
+    what was decided on reading.
     """
 
     time: Array

@@ -1,6 +1,4 @@
-"""Files that stand whole or not at all, and never over what is there. Tables are written twice: as CSV, for eyes and
-spreadsheets, and as Parquet, which keeps types and is read ten times faster.
-"""
+"""Files that stand whole or not at all; tables as CSV, for spreadsheets, and as Parquet, which keeps types."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -86,9 +86,7 @@ def parted_gain(gain: dict[str, dict[str, Any]]) -> str:
 
 
 def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
-    """Return causes (effect, target) by effect, the first targets of each by name: ``marker misplaced (C7, CLAV and 3
-    more)``.
-    """
+    """Return causes by effect, the first targets by name: ``marker misplaced (C7, CLAV and 3 more)``."""
     out = []
     for effect, of in grouped((spaced(effect), cause_in_words("", target)) for effect, target in causes).items():
         more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
@@ -138,8 +136,3 @@ def trial_and_subject(one: Attention) -> str:
         return one.trial if about else f"Trial {one.trial}"
     place = f", {one.trial}" if one.trial else ""
     return f"{about[:1].upper()}{about[1:]}{place}" or "Session"
-
-
-def first_upper(text: str) -> str:
-    """Return ``text`` with a capital first letter and nothing else changed."""
-    return text[:1].upper() + text[1:]

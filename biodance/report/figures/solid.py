@@ -30,10 +30,7 @@ SKIN = 0.3
 
 
 def sheet_png(stills: Sequence[Still]) -> bytes | None:
-    """Return one picture of all ``stills``, each titled by its ``trial``, as PNG bytes.
-
-    None where pyvista or GL is missing, or the child dies or is too slow.
-    """
+    """Return all ``stills``, titled by ``trial``, as PNG; None where pyvista or GL lacks, or the child dies."""
     if find_spec("pyvista") is None or not stills:
         return None
     try:

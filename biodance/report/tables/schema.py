@@ -93,16 +93,14 @@ class Schema:
 
 
 def value_at(record: Any, place: str) -> Any:
-    """Return what stands at a path of attributes, keys and numbers of items (``#``: how many; several, parted by a
-    comma: as a list); None behind None, and where there is no such key.
-    """
+    """Return what stands at a path of attributes, keys, numbers (``#`` counts; commas: a list); None for none."""
     if "," in place:
         return [value_at(record, one) for one in place.split(",")]
     for name in place.removeprefix("#").split("."):
         if record is None:
             return None
         if name.isdigit():
-            record = record[int(name)]
+            record = record[int(name)] if int(name) < len(record) else None
         else:
             record = record.get(name) if isinstance(record, Mapping) else getattr(record, name)
     return len(record) if place.startswith("#") and record is not None else record
