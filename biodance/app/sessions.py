@@ -275,12 +275,8 @@ class SessionPlace:
 
 
 class Archive:
-    """The sessions of a ``folder``, which is an archive or one session, with their results in ``out``.
-
-    Raises
-    ------
-    BiodanceError
-        There is no session, or the results would lie among the recordings.
+    """The sessions of a ``folder``, which is an archive or one session, with their results in ``out``. Raises
+    BiodanceError: there is no session, or the results would lie among the recordings.
     """
 
     def __init__(self, folder: Path, out: Path) -> None:
@@ -360,13 +356,7 @@ class Worker:
         self._thread: threading.Thread | None = None
 
     def start(self, places: Sequence[SessionPlace]) -> None:
-        """Begin a run over some sessions.
-
-        Raises
-        ------
-        BiodanceError
-            Another run is not finished.
-        """
+        """Begin a run over some sessions. Raises BiodanceError: another run is not finished."""
         with self._lock:
             if self.running:
                 raise BiodanceError("Another run is not finished. Wait for it, or stop it.")

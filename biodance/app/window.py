@@ -44,13 +44,7 @@ _FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "
 
 
 def read_results(place: SessionPlace) -> dict[str, Any]:
-    """Return the content of results.json.
-
-    Raises
-    ------
-    BiodanceError
-        There are no results, or they are damaged.
-    """
+    """Return the content of results.json. Raises BiodanceError: there are no results, or they are damaged."""
     try:
         return dict(parse_json((place.results / "results.json").read_text(encoding="utf-8")))
     except FileNotFoundError:
@@ -145,11 +139,7 @@ def csv_archive(place: SessionPlace) -> bytes:
 
 def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
     """Return name and content of the results in the format of another program; of one ``trial`` where it holds one.
-
-    Raises
-    ------
-    BiodanceError
-        It cannot be written; the sentence is that of ``biodance export``.
+    Raises BiodanceError: it cannot be written; the sentence is that of ``biodance export``.
     """
     refuse_unknown("format", kind, EXPORTS)
     stem = folder_name(f"{place.name}_{trial}" if trial else place.name).replace(" ", "_")

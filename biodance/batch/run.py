@@ -229,12 +229,8 @@ ON CONFLICT (name) DO UPDATE SET fingerprint = excluded.fingerprint, status = ex
 
 
 class Ledger:
-    """The book of one archive's results, open for one run.
-
-    Raises
-    ------
-    BiodanceError
-        The folder holds something else, the results of another archive, or another run is writing into it.
+    """The book of one archive's results, open for one run. Raises BiodanceError: the folder holds something else, the
+    results of another archive, or another run is writing into it.
     """
 
     def __init__(self, folder: Path, archive: Path) -> None:
@@ -332,32 +328,12 @@ def run_batch(
     """Go through every session of an archive and write page, numbers and log of each, and the summary of all.
 
     A run that was stopped is gone on with by the same call: sessions that are done with the recordings, settings and
-    version of now are not gone through again.
-
-    Parameters
-    ----------
-    archive : str or pathlib.Path
-        Folder with session folders at any depth.
-    out : str or pathlib.Path
-        Folder for the results: empty, new, or of an earlier run over this archive.
-    workers : int or str, optional
-        Processes of this machine, by default one for each core; or the address of a Dask scheduler whose workers see
-        both folders.
-    chosen : tuple of str
-        Settings, such as ``filter.cutoff=6``.
-    pages : bool
-        Whether a page is drawn for every session.
-    limit : float
-        s after which a session is given up.
-    work : callable
-        What is done with one session; for tests.
-    tell : callable, optional
-        Called with what is being done, how many sessions are finished, and of how many.
-
-    Returns
-    -------
-    BatchRun
-        What became of every session; ``summary.parquet``, ``summary.csv`` and ``report.html`` in ``out``.
+    version of now are not gone through again. ``archive`` holds session folders at any depth; ``out`` is empty, new, or
+    of an earlier run over it, and gets ``summary.parquet``, ``summary.csv`` and ``report.html``. ``workers`` are
+    processes of this machine, by default one for each core, or the address of a Dask scheduler whose workers see both
+    folders; ``chosen`` settings, such as ``filter.cutoff=6``; ``pages`` whether a page is drawn for every session;
+    ``limit`` s after which a session is given up; ``work`` what is done with one, for tests; ``tell`` is called with
+    what is being done, how many sessions are finished, and of how many.
 
     Raises
     ------

@@ -104,12 +104,8 @@ def _without_static(
 
 
 def calibrate_joints(scaling: Scaling, read: tuple[TrialResult, ...]) -> Scaling:
-    """Return the scaling with the joints that the trials with role fit show at the places where these show them.
-
-    Raises
-    ------
-    TrialRefused
-        No trial with role fit has markers of the same set.
+    """Return the scaling with the joints that the trials with role fit show at the places where these show them. Raises
+    TrialRefused: no trial with role fit has markers of the same set.
     """
     wanted = scaling.posture.marker_set.name
     fits = [one.trial for one in read if one.usable and one.trial.role == "fit" and one.trial.marker_set == wanted]

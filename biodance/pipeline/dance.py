@@ -289,12 +289,7 @@ TRIAL_SECONDS = 20.0
 
 def foresee_dance(path: Path) -> tuple["Foresight", Dance, Expectation | None]:
     """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, the
-    dance, and what it teaches of a person's masses (None of a robot's).
-
-    Raises
-    ------
-    FileRefused
-        The file is no dance.
+    dance, and what it teaches of a person's masses (None of a robot's). Raises FileRefused: the file is no dance.
     """
     from biodance.diagnosis.foresight import foresee, session_of
 
@@ -319,12 +314,7 @@ _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 def dancer(subject: Subject, plan: Plan) -> Body:
     """Return the body of a person for whom a dance is designed: a generic one, joints within the ranges that the plan
-    names.
-
-    Raises
-    ------
-    BiodanceError
-        Mass or stature are outside the range of the tables.
+    names. Raises BiodanceError: mass or stature are outside the range of the tables.
     """
     for name, (low, high, unit) in _LEGAL.items():
         value = getattr(subject, name)

@@ -66,11 +66,7 @@ def account_for(
     result: SessionResult, diagnosis: SessionDiagnosis | None = None, movement: SessionMovement | None = None
 ) -> SubjectAccount:
     """Return what the subject may be told of a session, of its ``diagnosis`` and its ``movement`` where they were made.
-
-    Raises
-    ------
-    SessionRefused
-        ``session.toml`` cannot be read.
+    Raises SessionRefused: ``session.toml`` cannot be read.
     """
     visit = read_session_file(result.session.folder).visit
     withheld, kinds = _withheld(result, diagnosis), movement.repetitions.values() if movement else ()

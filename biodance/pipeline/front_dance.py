@@ -347,12 +347,8 @@ def simulate(
 def virtual_subject(
     dance: "Dance | None", *, sex: str | None, height: float | None, mass: float | None, age: float
 ) -> Subject:
-    """Return the person to simulate: as said, else the one for whom the ``dance`` was designed.
-
-    Raises
-    ------
-    BiodanceError
-        Sex, height or mass is missing, and the dance does not know its person either.
+    """Return the person to simulate: as said, else the one for whom the ``dance`` was designed. Raises BiodanceError:
+    sex, height or mass is missing, and the dance does not know its person either.
     """
     known = dance.subject if dance is not None else None
     said = {"sex": sex, "height": height, "mass": mass}

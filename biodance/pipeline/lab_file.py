@@ -51,12 +51,8 @@ NO_LAB = LabFile()
 
 
 def read_lab(path: str | Path | None) -> LabFile:
-    """Return what the file of a laboratory says; nothing without a file.
-
-    Raises
-    ------
-    FileRefused
-        It cannot be read, or says what cannot be corrected.
+    """Return what the file of a laboratory says; nothing without a file. Raises FileRefused: it cannot be read, or says
+    what cannot be corrected.
     """
     if path is None:
         return NO_LAB

@@ -244,12 +244,8 @@ def learned_together(
     left_out: Mapping[str, str],
     healthy: HealthyReference = NO_REFERENCE,
 ) -> LearnedLaboratory:
-    """Return what the sessions teach together, beside the ``healthy`` reference.
-
-    Raises
-    ------
-    SessionRefused
-        Fewer than three sessions, and no band of healthy people.
+    """Return what the sessions teach together, beside the ``healthy`` reference. Raises SessionRefused: fewer than
+    three sessions, and no band of healthy people.
     """
     names, seen = (
         tuple(one.name for one in sessions),

@@ -141,12 +141,8 @@ def kept_body(folder: Path) -> Path:
 
 
 def read_kept_body(folder: Path) -> tuple[Body, str]:
-    """Return the body of a results folder, or of a body.json, and where it comes from in words.
-
-    Raises
-    ------
-    FileRefused
-        The file is no body, or not the one that the run of the folder wrote.
+    """Return the body of a results folder, or of a body.json, and where it comes from in words. Raises FileRefused: the
+    file is no body, or not the one that the run of the folder wrote.
     """
     if folder.is_dir():
         refuse_mixture(folder, (BODY_FILE, SCALED))
@@ -154,12 +150,8 @@ def read_kept_body(folder: Path) -> tuple[Body, str]:
 
 
 def known_body(body: Body | str | Path | None) -> Body | None:
-    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one.
-
-    Raises
-    ------
-    FileRefused
-        The file is no body.
+    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one. Raises
+    FileRefused: the file is no body.
     """
     if body is None or isinstance(body, Body):
         return body

@@ -265,13 +265,7 @@ def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding | None:
 
 
 def identification_of(result: SessionResult) -> SessionIdentification:
-    """Return the identification of a session.
-
-    Raises
-    ------
-    SessionRefused
-        There is none; the message says why.
-    """
+    """Return the identification of a session. Raises SessionRefused: there is none; the message says why."""
     if result.identification is not None:
         return result.identification
     folder = result.session.folder

@@ -86,12 +86,8 @@ def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[st
 
 
 def still_of(body: Body, results: tuple[TrialResult, ...]) -> Still:
-    """Return the middle frame of the first static trial with a motion, else of the first trial with one.
-
-    Raises
-    ------
-    TrialRefused
-        No trial has a motion.
+    """Return the middle frame of the first static trial with a motion, else of the first trial with one. Raises
+    TrialRefused: no trial has a motion.
     """
     one = _drawn_first(results)
     if one is None or one.motion is None or one.trial.markers is None:

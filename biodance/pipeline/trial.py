@@ -105,12 +105,8 @@ def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> Marke
 
 
 def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
-    """Return the soles of the moving body, else of the foot markers.
-
-    Raises
-    ------
-    TrialRefused
-        There is no motion, and no heel or toe marker.
+    """Return the soles of the moving body, else of the foot markers. Raises TrialRefused: there is no motion, and no
+    heel or toe marker.
     """
     if body is not None and motion is not None:
         return soles_from_body(body, motion)
@@ -122,12 +118,7 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
 
 def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
     """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured
-    frames.
-
-    Raises
-    ------
-    TrialRefused
-        No frame is fully measured; the message says why.
+    frames. Raises TrialRefused: no frame is fully measured; the message says why.
     """
     measured, simulated = trial.wrench, predict_wrench(body, motion)
     if np.nanmax(measured.force[:, 2], initial=0.0) < trial.settings.standing.force:
@@ -220,12 +211,8 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
 
 
 def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:
-    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters.
-
-    Raises
-    ------
-    TrialRefused
-        The trial gives no motion, or one too short.
+    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters. Raises
+    TrialRefused: the trial gives no motion, or one too short.
     """
     if body is None or one.motion is None:
         raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())

@@ -52,13 +52,8 @@ ENDINGS = (".csv", ".parquet")
 
 
 def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
-    """Return the folder for tables, made if missing, before any long work starts.
-
-    Raises
-    ------
-    SessionRefused
-        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not
-        ``force``.
+    """Return the folder for tables, made if missing, before any long work starts. Raises SessionRefused: it is the
+    session folder or one above it, a file, holds anything else than tables, or holds tables and not ``force``.
     """
     folder, session = folder.resolve(), session.resolve()
     if folder == session or folder in session.parents:

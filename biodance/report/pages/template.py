@@ -33,12 +33,8 @@ _LIBRARY = re.compile(r"<script>(/\*\*\s*\* @license[^/]*\*/\n[^\n]{100000,})\n"
 
 @cache
 def three_js() -> str:
-    """Return the text of three.js with its licence notice, as trimesh carries it for its own viewer.
-
-    Raises
-    ------
-    BiodanceError
-        The installed trimesh carries none.
+    """Return the text of three.js with its licence notice, as trimesh carries it for its own viewer. Raises
+    BiodanceError: the installed trimesh carries none.
     """
     found = find_spec("trimesh")
     place = Path(found.origin if found and found.origin else "trimesh").parent / "resources/templates/viewer.zip"
