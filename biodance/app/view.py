@@ -43,9 +43,11 @@ def markers_document(trial: Trial) -> dict[str, Any]:
         worn = read_marker_set(trial.marker_set)
         segments = {label: worn.marker(own).segment for own, label in worn.match(markers.names).items()}
     filled = fill_gaps(markers, segments)[0]  # as a run would fill them
+    # -(-a // b) rounds up: so many frames are left out between two that at most `_FRAMES` stay
     chosen = np.arange(0, markers.time.size, max(1, -(-markers.time.size // _FRAMES)))
     xyz = filled.xyz[chosen]
     origin = np.nanmean(markers.xyz, axis=(0, 1)).round(4)
+    # places are whole numbers of 16 bits, and the furthest is 30,000 steps from the origin
     unit = max(1e-4, float(np.nanmax(np.abs(xyz - origin))) / 30000)
     drawn = filled.filled if filled.filled.size else np.zeros(markers.seen.shape, dtype=bool)
     spans = {"gaps": ~markers.seen, "filled": drawn}

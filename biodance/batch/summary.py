@@ -70,6 +70,7 @@ def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
             continue
         value = known[column].to_numpy() * factor
         middle = float(np.median(value))
+        # 1.4826 times the median absolute deviation is the sd of normal values
         spread = 1.4826 * float(np.median(np.abs(value - middle)))
         far = known.assign(value=value, away=np.abs(value - middle) / max(spread, 1e-12))
         worst = far[far["away"] > _FAR].sort_values("away", ascending=False).drop_duplicates("session")

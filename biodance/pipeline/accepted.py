@@ -405,6 +405,7 @@ def _mended(result: SessionResult, roles: tuple[Role, ...], mend: _Mend, phi: Ar
 
 def _by_halves(body: Body, fits: _Fits, about: Array, prior: Sip | None) -> tuple[Residuals | None, Residuals | None]:
     """Return what the body of each half of the movement leaves of that half, and of the other; None for nothing."""
+    # frames in use are counted through all trials: those up to half of their number are the first half
     first = np.cumsum(np.concatenate([fit.use for fit in fits]))
     early = np.split(2 * first <= first[-1], np.cumsum([fit.use.size for fit in fits])[:-1])
     parts = [

@@ -76,6 +76,7 @@ def headline(
         own = "warn" if missed else "note"
         well = all(other.level == "note" for other in others)
         sentences = _clean(amount(judged, static), missed, well=well)
+    # sentences come ever shorter: the first that is short enough says most
     text = next(text for text in sentences if len(text.split()) <= WORDS)
     return Attention(min((own, *(other.level for other in others)), key=LEVELS.index), text, about=ABOUT)
 
@@ -116,6 +117,7 @@ def _named(one: Diagnosis) -> Iterator[str]:
     start = "" if more == 1 else f"{more} things are wrong. First, "
     also = alternatives(first)
     rest = ", and more is wrong" if not {Reason.FORCES_LEFT, Reason.UNUSUAL_BODY}.isdisjoint(one.why) else ""
+    # with every alternative by name, with one, with none
     several = (_joined(also, "or"), f"{also[0]} or something else", "something else") if also else ()
     sets = [f", or it is {some}" for some in several] or [""]
     for fact in (told.fact, told.plain):

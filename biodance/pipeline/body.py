@@ -204,6 +204,7 @@ def _of_forces(forces: Sequence[ForceGain]) -> tuple[str, ...]:
     """Return in one sentence what the joints bring to the forces: horizontal, and vertical."""
     if not forces:
         return ()
+    # (trials, 3) N RMS by axis; over the axes squares add up, over the trials their mean counts
     without, with_them = (np.array([getattr(one, name) for one in forces]) for name in ("without", "with_them"))
     told = []
     for name, axes in (("horizontal", slice(0, 2)), ("vertical", slice(2, 3))):
@@ -272,6 +273,7 @@ def _unlike_legs(known: Body, body: Body) -> str:
 
 def _leg(body: Body) -> float:
     """Return the length (m) from hip to knee to ankle, mean of both sides; 0 where a leg has neither."""
+    # a joint's place in its parent: of the knee the length of the thigh, of the ankle that of the shank
     length = {joint.name: float(np.linalg.norm(joint.translation)) for joint in body.joints}
     ends = [f"{side}_{joint}" for side in SIDES for joint in ("knee_flexion", "ankle_dorsiflexion")]
     return sum(length[end] for end in ends) / len(SIDES) if all(end in length for end in ends) else 0.0

@@ -168,6 +168,7 @@ class DanceResult:
             covariance = self.body.sip.covariance  # of [m, mc, I] by segment: every tenth row is a mass
             i, j = 10 * here, 10 * there
             alike = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+            # left of the table's sd on the other side, too: the emphasis taught both through their correlation
             if after[there] / before[there] < _AS_MUCH * after[here] / before[here]:
                 said += f" Both, because a person's sides are alike (correlation in the table {alike:.2f})."
             out.append(said)

@@ -59,11 +59,14 @@ def stretches(dance: Dance) -> tuple[Shown, ...]:
     """Return the dance in stretches between the steps that change a foot's place, which are not recorded."""
     motion, groups = dance.motion(_RATE), [[0]]
     for p in range(1, len(dance.stances)):
+        # a posture on feet set anew begins another stretch
         same = np.array_equal(dance.stances[p].ankle, dance.stances[p - 1].ankle)
         groups[-1].append(p) if same else groups.append([p])
     out = []
     for number, group in enumerate(groups, start=1):
         if len(group) > 1:
+            # a move belongs to the posture it leads to: that into the first one of a stretch is the step, not
+            # recorded
             own = [phase for phase in dance.phases if phase.posture in group]
             phases = [phase for phase in own if phase.kind == "hold" or phase.posture > group[0]]
             rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
@@ -94,6 +97,7 @@ def _raised(dance: Dance, phase: Phase, time: Array) -> Array:
     for foot in {0, 1} - set(phase.stance.planted):
         up = np.ones(time.size)
         if phase.kind == "move":
+            # up in the first share of a move from a stance in which the foot stood, down in the last of one into such
             way = (time - phase.start) / (phase.end - phase.start)
             before, after = (foot in dance.stances[p].planted for p in (phase.posture - 1, phase.posture))
             up = (septic(way / LIFT) if before else up) * (septic((1 - way) / LIFT) if after else 1.0)

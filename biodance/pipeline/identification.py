@@ -59,6 +59,7 @@ def load_doubts(checks: Iterable[Check], *, weighed: bool) -> tuple[str, ...]:
 
 def _upper(what: str, where: str, value: float, limit: float, unit: str, advice: str) -> Check:
     inside = bool(value <= limit)
+    # as few digits as leave the printed value on the same side of its limit
     digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
     return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:g} {unit}", inside, advice)
 
@@ -135,6 +136,7 @@ allow.
 
 def unexplained_mass(fitted: tuple[TrialValidation, ...], gravity: float) -> float:
     """Return how many kg more the plates carry than the identified body, in the mean over the fitted trials."""
+    # in the mean nobody accelerates upwards, so that the vertical force left over is a weight
     beyond = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted])
     return float(beyond.mean()) / gravity
 
@@ -398,6 +400,7 @@ def _weighed(one: SessionIdentification, reference: SessionIdentification) -> Se
     )
     declared, carried = now[0] - then[0], now[1] - then[1]
     gain, scale = around_zero("plate_gain Fz") * then[1], error_size("scale", "mass")
+    # each of two sessions errs by itself: the sd of a difference is the root of 2 times as large
     limits = [SIGMAS * np.sqrt(2.0) * sd for sd in (scale, gain)]
     if abs(declared) <= limits[0] and abs(carried) <= limits[1]:
         return one
@@ -425,6 +428,7 @@ def predicted(
     notes, on_same, plates = list(one.notes), _on_fitted_plates(results), None
     if on_same.intersection(fit.name for fit in parts[1]):
         beside, table = (one.posterior or one).identification, found.body.sip
+        # the table of a person of the weighed mass: all ten parameters of a segment grow with it
         share = (mass or table.mass.sum()) / table.mass.sum()
         weighed_table = replace(found.body, sip=Sip(table.segments, share * table.phi, table.covariance))
         of_table, own = plate_readings(beside, parts[0], weighed_table, identified)

@@ -82,6 +82,7 @@ def healthy_reference(healthy: Sequence[MeasuredWalk], everybody: Sequence[Measu
         for side, rows in one.vectors.items():
             legs.setdefault((one.person, side), []).extend(rows)
     strides = [row for one in everybody for rows in one.vectors.values() for row in rows]
+    # as many features (singular vectors) as that cannot be found in fewer strides
     enough = len(strides) >= FEATURES and len(legs) >= _FEWEST_LEGS
     means = [np.mean(rows, axis=0) for rows in legs.values()]
     deviation = deviation_reference(np.stack(strides), np.stack(means)) if enough else None
@@ -247,10 +248,7 @@ def learned_together(
     """Return what the sessions teach together, beside the ``healthy`` reference. Raises SessionRefused: fewer than
     three sessions, and no band of healthy people.
     """
-    names, seen = (
-        tuple(one.name for one in sessions),
-        norms([row for one in sessions for row in one.seen]),
-    )
+    names, seen = tuple(one.name for one in sessions), norms([row for one in sessions for row in one.seen])
     if len(sessions) < FEWEST and healthy.normal:
         return LearnedLaboratory(archive, now(), None, seen, names, {}, dict(left_out), healthy)
     if len(sessions) < FEWEST:

@@ -177,6 +177,7 @@ class LiveSession:
 
     def _take(self, stop: int, until: int) -> Iterator[None]:
         """Do the work of the window that ends before frame ``stop`` for the frames not yet done before ``until``."""
+        # a whole window, or further back where frames wait: the filter needs `_DELAY` of settled frames before them
         start = max(0, min(stop - self._window, self._done - self._delay))
         cut = slice(start, stop)
         q = upright_trunk(self.body, np.array(self._q[cut]), self.markers.rate)
@@ -204,6 +205,7 @@ class LiveSession:
         for plate in self.trial.plates:
             at = plate.wrench.time
             step = 0.5 * float(at[1] - at[0]) if at.size > 1 else 0.0
+            # half a sample further at both ends: clocks of plates and markers are rounded differently
             pick = slice(*np.searchsorted(at, [time[0] - step, time[-1] + step]))
             plates.append(replace(plate, wrench=Wrench(at[pick], plate.wrench.value[pick])))
         return replace(self.trial, markers=markers, plates=tuple(plates))
@@ -297,6 +299,7 @@ class StreamWatch:
             return
         if "markers" in self._suspect or np.isnan(self._sound).any():
             return
+        # the five markers furthest from the body, of which two may have changed names
         last = np.nan_to_num(distances[-1])
         worst = [self._follower.names[i] for i in np.argsort(-last)[:5] if last[i] > 0]
         self._warn("markers", said_of_markers(now, worst, self._follower.exchange(xyz, worst, self._sound)))
@@ -336,6 +339,7 @@ class StreamWatch:
         if any(key != "wrench" for key in self._suspect):
             return
         self._point = point if self._point is None else self._point
+        # each column of W is the wrench of one parameter (kg, kg·m, kg·m²): it moves to the point as a wrench does
         turned = np.swapaxes(wrench_about_point(np.swapaxes(W, 1, 2), self._point), 1, 2)
         moved, found = wrench_about_point(wrench, self._point), None
         for first in range(0, len(W), step):

@@ -271,6 +271,7 @@ def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], li
         return fitted, kept
     first, last = [], []
     for one in fitted:
+        # cut where the last share of what may be used begins, not of all that was recorded
         use = np.flatnonzero(one.fit.use)
         cut = use[int((1 - _KEPT) * use.size)] if use.size else 0
         early = np.arange(one.fit.use.size) < cut
@@ -316,10 +317,12 @@ def _in_root(one: MatchedTrial, seen: TrialValidation) -> tuple[Agreement, Agree
     q = one.fit.motion.q
     on_plate = elementary_rotation("z", one.plate.yaw)
     turn = on_plate @ quaternion_matrix(q[:, 3:7])
+    # from the root, as it stands on the plate, to the point that the moments are about
     arm = seen.about - [*one.plate.place, 0.0] - q[:, :3] @ on_plate.T
 
     def turned(wrench: Wrench) -> Wrench:
         force, moment = wrench.value[:, :3], wrench.value[:, 3:]
+        # M about the root = M about the point + arm x F
         moment = moment + cross(arm, force)
         both = [np.einsum("tji,tj->ti", turn, part) for part in (force, moment)]
         return Wrench(wrench.time, np.concatenate(both, axis=1))

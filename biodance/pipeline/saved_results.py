@@ -240,6 +240,7 @@ def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
         )
     filtered = replace(trial, settings=trial.settings.changed({"filter.cutoff": kept.cutoffs[name]}))
     ready, motion = prepare_trial(filtered), kept.motions[name]
+    # the same recording, filtered alike, sums to the same wrench unless its plates were corrected
     if not np.allclose(_load(ready.trial), kept.loads[name], rtol=1e-6, atol=1e-3):
         raise TrialRefused(
             f"Trial {name}: its plates were corrected when the results were made (a lab.toml). Give the session folder."

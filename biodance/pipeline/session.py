@@ -82,6 +82,7 @@ def _placed(
     )
     if earlier is not None:
         before, trials = earlier
+        # scaling and joints rest on markers, person and hidden frames alone: equal ones give an equal body
         same = before.subject == subject and before.known is known and all(map(np.array_equal, hidden, before.hidden))
         if same and _same_markers(read, trials):
             return before
@@ -261,6 +262,7 @@ def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding | None:
     """Return the quiet standing of a static trial, else of a check, else the longest; None without any."""
     found = [(result.trial.role, result.standing) for result in results if result.standing is not None]
     order = {"static": 0, "check": 1}
+    # of one role the longest: start - end is the smallest
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end), default=("", None))[1]
 
 

@@ -30,6 +30,7 @@ def parent_segments(body: Body) -> list[int]:
     """Return for every segment the segment it hangs on; -1 for the root's."""
     parents = []
     for joint in body.segment_joint:
+        # joints of several axes are chains of which only the last one carries a segment: go to the first
         while joint >= 0 and body.joints[joint].parent >= 0 and body.joints[body.joints[joint].parent].segment < 0:
             joint = body.joints[joint].parent
         above = body.joints[joint].parent if joint >= 0 else -1
@@ -77,6 +78,7 @@ def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[st
 
     pose, out = poses(body, q), []
     toward = np.array([*eye, 0.0])
+    # rows: across is the horizontal at right angles to the eye's direction, up is the lab's z
     seen = np.array([[-eye[1], eye[0], 0.0], [0.0, 0.0, 1.0]])
     for segment, box in shape_parts(body):
         points = _solid_points(box.tobytes()) @ pose.rotation[0, segment].T + pose.position[0, segment]
@@ -290,6 +292,7 @@ def _trial(
     simulated, parameters, residual = _simulated(one, validated.get(one.name))
     size = np.linalg.norm(residual, axis=1)
     worst, step = int(np.nanargmax(size)) if np.isfinite(size).any() else None, max(1, round(motion.rate / rate))
+    # begin so that every step-th frame meets the worst one
     chosen = np.arange((worst or 0) % step, motion.time.size, step)
     shown = motion.at(chosen)
     pose = poses(body, shown.q)
@@ -326,5 +329,6 @@ def _simulated(one: TrialResult, found: TrialValidation | None) -> tuple[Array, 
     else:
         nothing = np.full((one.motion.time.size, 2, 3), np.nan)
         return nothing, "table", nothing[:, 0]
+    # the moments are about ``about``: the floor's height and the point found are counted from there
     cop = zero_moment_point(wrench, height=one.trial.floor - about[2], threshold=20.0) + about
     return np.stack([wrench[:, :3], cop], axis=1), parameters, np.where(use[:, None], left[:, :3], np.nan)

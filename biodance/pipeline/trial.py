@@ -95,6 +95,7 @@ def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> Marke
     count = seen.sum(axis=0)
     total = np.where(seen, squares, 0.0)
     rms = np.sqrt(np.divide(total.sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0))
+    # a marker that was never seen has neither; NaN, without numpy's warning of empty means
     largest = np.where(count > 0, np.where(seen, motion.residual, -np.inf).max(axis=0, initial=-np.inf), np.nan)
     overall = np.sqrt(total.sum() / count.sum()) if count.any() else np.nan
     member = np.array([(groups or {}).get(name, "") for name in motion.marker_names])
@@ -202,6 +203,7 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
         return {}
     masks, fit = {**contact.left_out, LeftOut.POSTURE_OPEN: np.logical_not(one.motion.determined)}, trial_fit(one)
     if fit is not None:
+        # gates in their order: frames that forces contradict, then what is left in runs too short to judge
         kept = believable(body, fit, standing_point((fit,)))[0].use
         masks[LeftOut.FORCES_DIFFER] = fit.use & ~kept
         masks[LeftOut.SHORT_RUN] = kept.copy()

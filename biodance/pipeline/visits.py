@@ -109,6 +109,7 @@ def _values(moved: SessionMovement, foot: str) -> dict[_About, list[KeyValue]]:
 
 def _mean(some: Sequence[KeyValue]) -> VisitMean:
     """Return what a visit says of a quantity, with what all its cycles share."""
+    # independent of each other and the same in all cycles of a visit, so that no mean over cycles makes them smaller
     shared = float(np.hypot(placement_sd(_kind(some)), np.mean([one.sd for one in some])))
     return visit_mean(np.array([one.value for one in some]), systematic=shared)
 
@@ -164,6 +165,7 @@ def mass_quantities(
 
 def _whole(weighed: Sequence[Weighing | None], first: Weighing, last: Weighing) -> ComparedQuantity:
     """Return the mass that the plates carry, each visit with its own error."""
+    # two weighings err independently: variances add; p is two-sided of a normal difference
     change, sd = last.mass - first.mass, float(np.hypot(first.sd, last.sd))
     return ComparedQuantity(
         kind=BODY_KIND, quantity="total_mass", key="", side="both", unit="kg",
@@ -321,6 +323,7 @@ def compare_visits(sessions: Sequence[Session], *, tell: Callable[[str], None] =
             "Give visits with the same kind of movement."
         )
     told = beyond_chance([one.p for one in found])
+    # what changed stands first, the change of most half widths on top; the rest keeps its order
     marked = [replace(one, changed=bool(change)) for one, change in zip(found, told, strict=True)]
     ordered = sorted(marked, key=lambda one: (not one.changed, -one.distance if one.changed else 0.0))
     return VisitComparison(visits, tuple(ordered), (*why, *_notes(visits, marked)))

@@ -20,6 +20,7 @@ def format_number(value: float | None, digits: int = 1) -> str:
     """Return a number as text with a true minus sign; "–" where it is unknown."""
     if value is None or not math.isfinite(value):
         return "–"
+    # what rounds to zero has no sign
     text = f"{value:.{digits}f}"
     return text.replace("-", "−") if float(text) else text.lstrip("-")
 
@@ -60,6 +61,7 @@ def _shown(value: float, unit: str) -> tuple[str, str]:
     """Return a number and its unit as a person says them."""
     factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 4 if unit == "kg·m²" else 2))
     shown = factor * value
+    # three significant digits: a number of the order 10^n shows 2 - n of them behind the point
     large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
     return format_number(shown, max(0, min(digits, 2 - large))), name
 

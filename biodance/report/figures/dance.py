@@ -38,6 +38,7 @@ def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
     """Draw postures ``q`` (P, nq) in rows of ten, titled, to one scale; right is blue, left red and dashed."""
     lines, sides = bone_lines(body, poses(body, q))
     flat = lines @ VIEW.T
+    # each posture about its own middle, heights as they are
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
     rows = -(-len(q) // _COLUMNS)
@@ -80,6 +81,7 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
         for column, name in enumerate(names):
             mine = [path for path in paths if path.stance.name == name]
             feet = mine[0].stance
+            # the base of support shrunk about its centre
             usable = feet.centre + feet.share * (feet.support - feet.centre)
             for axes, colour, what in zip(panels[:, column], (BLUE, ORANGE), ("designed", "straight"), strict=True):
                 _outline(axes, feet.support, BLACK, "-", "base of support")

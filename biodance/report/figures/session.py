@@ -47,6 +47,7 @@ _SQUARE = svg.Frame(width=390.0, height=240.0, left=48.0)
 def _turned(place: Array, standing: QuietStanding) -> Array:
     """Return lab points (..., 2) as millimetres to the subject's right and ahead, from the mean centre of pressure."""
     ahead = standing.forward
+    # ahead turned by -90 degrees about the vertical
     right = np.array([ahead[1], -ahead[0]])
     arm = place - np.nanmean(standing.cop, axis=0)
     return 1000 * np.stack([arm @ right, arm @ ahead], axis=-1)
@@ -82,6 +83,7 @@ def _surroundings(x: svg.Axis, y: svg.Axis, standing: QuietStanding) -> list[str
 def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[svg.Axis, svg.Axis]:
     """Return two axes of one scale about ``middle`` (2,) that reach at least ``reach`` to each side."""
     aspect = (_SQUARE.width - _SQUARE.left - _SQUARE.right) / _SQUARE.height
+    # one mm is as long on both axes: the longer side of the panel shows more
     wide, high = reach * max(aspect, 1.0), reach * max(1.0, 1 / aspect)
     return (
         svg.Axis(middle[0] - wide, middle[0] + wide, labels[0]),
@@ -230,6 +232,7 @@ def still_figure(still: Still) -> str:
         shown = (points[np.isfinite(points).all(axis=1)] @ screen)[:, :2]
         body = (still.bones.reshape(-1, 3) @ screen)[:, :2]
         (left, top), (right, foot) = shown.min(axis=0) - 90, shown.max(axis=0) + 90
+        # plates far from the body are cut off, or it would be small
         middle, half = float(body[:, 0].mean()), 900.0
         left, right = max(left, middle - half), min(right, middle + half)
         foot = min(foot, float(body[:, 1].max()) + 500.0)

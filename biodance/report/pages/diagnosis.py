@@ -57,6 +57,7 @@ def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
             if not np.isfinite(z):
                 cells.append("<td>–</td>")
                 continue
+            # white at 0 sd, darkest at twice the limit and above
             grey, said = round(255 - 185 * min(max(z, 0.0) / (2 * LIMIT), 1.0)), wording.format_number(z, 0)
             cells.append(
                 f'<td class="n" style="background:rgb({grey},{grey},{grey});color:{"#fff" if grey < 130 else "#000"}">'
@@ -79,6 +80,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     y = svg.Axis(-0.6, len(order) - 0.4, "", tuple((float(i), spaced(name)) for i, name in enumerate(order)))
     marks = [svg.rule(x, 1.0, upright=True, look=svg.Stroke(BLACK, "", 0.9))]
     for i, name in enumerate(order):
+        # "never" is infinite, and a logarithmic axis has an end: drawn at the edge
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
         marks.append(svg.segments(x, y, np.array([[value.min(), i], [value.max(), i]]), svg.Stroke(GREY, "", 2.5)))
         marks.append(svg.points(x, y, np.median(value), i, svg.Stroke(BLUE)))
@@ -153,6 +155,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     witnesses = _witnesses(one.witnesses)
     witnessed = {(row["effect"], row["target"]) for row in witnesses["seen"]} if witnesses else set()
     blind = LIMIT_ROW.rows(row for row in one.unobservable if (row.effect, row.target) not in witnessed)
+    # what no observation sees either, apart by whether any size of it would be seen
     never = [row for row in blind if wording.size_seen(row["limit"], row["typical"], row["unit"]) == wording.NEVER]
     return render(
         "diagnosis.html.j2",

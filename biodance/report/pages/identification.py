@@ -70,6 +70,7 @@ def _beside(paper: Identification | None, name: str, times: float = 1.0) -> dict
 def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load: _Load = None) -> str:
     """Return one panel: a row for each segment."""
     ends = np.array([v for row in rows for v in (*row.before, *row.after, beside.get(row.name, row.after[0]))])
+    # some room at both ends; an axis of masses does not go below zero for it
     room, least = 0.04 * float(np.ptp(ends)), -np.inf if ends.min() < 0 else 0.0
     x = svg.Axis(max(least, float(ends.min()) - room), float(ends.max()) + room, label)
     ticks = tuple((len(rows) - 1.0 - i, spaced(row.name)) for i, row in enumerate(rows))
@@ -245,6 +246,7 @@ def identification_section(found: SessionIdentification) -> str:
     from markupsafe import Markup
 
     one, sure = found.identification, certain_changes(found.changes)
+    # beside the paper's programme the figures show the posterior, which alone has intervals
     drawn, paper = (found.posterior.identification, one) if found.posterior else (one, None)
     carried = (found.search.best.segment, found.search.best.mass) if found.search.found else None
     rows, logs = tables.segments_document(one), found.performance.logs if found.performance else ()

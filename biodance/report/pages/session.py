@@ -62,6 +62,7 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
         [one.positions, one.markers, one.com[:, None], one.measured[:, 1:], one.simulated[:, 1:]], axis=1
     )
     origin = np.nanmean(one.com, axis=0)
+    # whole numbers of 16 bits: the segment furthest from the origin is at most 30,000 steps away
     unit = max(1e-4, float(np.nanmax(np.abs(one.positions - origin))) / 30000)
     forces = np.stack([one.measured[:, 0], one.simulated[:, 0], one.residual], axis=1)
     return {
@@ -147,6 +148,7 @@ class TrialPart:
         """What was decided when the trial was read and prepared, each sentence once."""
         trial = self.result.trial
         lines = ((plate.name, line) for plate in trial.plates for line in plate.decisions)
+        # a reader's history repeats some of what it decided on plates
         told = [f"{name}: {line}" for name, line in lines if not any(line in said for said in trial.history)]
         return [*trial.history, *told]
 

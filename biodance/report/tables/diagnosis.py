@@ -104,6 +104,7 @@ def _parameters(found: Sequence[Estimate]) -> Row:
 def _masses(found: Identification | None) -> list[Row] | None:
     if found is None or found.status == "failed":
         return None
+    # the mass is the first of the ten parameters of every segment
     sd = np.sqrt(np.diag(found.sip.covariance)[::10])
     columns = zip(found.sip.segments, found.sip.mass, sd, strict=True)
     return [{"name": name, "mass_kg": mass, "mass_sd_kg": s} for name, mass, s in columns]

@@ -54,10 +54,12 @@ def _strides(moved: SessionMovement) -> "DataFrame":
 def _curves(one: TrialMovement) -> "DataFrame | None":
     if not one.curves:
         return None
+    # a curve holds the very cycle of the list, so that no values need to be compared
     numbers = {id(cycle): k for k, cycle in enumerate(one.cycles, start=1)}
     about = Schema("kind=cycle.kind quantity side unit")
     rows = [{"trial": one.trial, "cycle": numbers[id(curve.cycle)], **about.row(curve)} for curve in one.curves]
     frame = table_of(rows, ("trial", "cycle", *about.places))
+    # one row a curve becomes one row a per cent, its values in the same order
     lasting = frame.loc[frame.index.repeat(len(PERCENT))].reset_index(drop=True)
     lasting["percent"] = np.tile(PERCENT, len(rows))
     lasting["value"] = np.concatenate([curve.value for curve in one.curves])

@@ -110,6 +110,7 @@ def torques_document(bands: TorqueBands | None) -> Row | None:
     joints, columns = list[Row](), (bands.torque, bands.half_width, bands.table, bands.sd)
     for j, name in enumerate(bands.joints):
         torque, half, table, sd = (column[bands.use, j] for column in columns)
+        # where the identified torque is largest, either way; the table's is that of the same instant
         peak = int(np.argmax(np.abs(torque)))
         interval = (torque[peak] - half[peak], torque[peak] + half[peak])
         sizes = (np.sqrt(np.mean(sd**2)), np.sqrt(np.mean((torque - table) ** 2)))
