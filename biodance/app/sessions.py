@@ -67,6 +67,7 @@ class SessionText:
     def steps(self) -> tuple[bool, bool]:
         """Whether there is a state to go back to, and one to go forth to."""
         states, at = self._states(), self._position()
+        # changed elsewhere: going back leads to what was written here last, and nothing lies ahead
         changed = bool(states) and _read(states[at]) != self.text
         return at > 0 or changed, at < len(states) - 1 and not changed
 

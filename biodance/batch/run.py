@@ -66,6 +66,7 @@ def run_here(
     """
     lost, stop = deque[SessionTask](), stop or threading.Event()
     yield from _beside(deque(tasks), work, workers, lost, stop)
+    # one at a time: what died beside others, of their memory perhaps, may get through alone
     for _ in range(TRIES - 1):
         again, lost = lost, deque[SessionTask]()
         yield from _beside(again, work, 1, lost, stop)
@@ -244,6 +245,7 @@ class Ledger:
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = (folder / _LOCK).open("w", encoding="utf-8")
         try:
+            # goes with the process, however that ends
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self._lock.close()

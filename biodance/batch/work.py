@@ -114,6 +114,7 @@ def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
     above = (session.resolve().parent / name for name in FILES)
     for path in (*sorted(session.rglob("*")), *above):
         if path.is_file():
+            # size and time stand for the content: to hash a whole archive would take hours at every start
             known, name = path.stat(), os.path.relpath(path, session)
             seen.update(repr((name, known.st_size, known.st_mtime_ns)).encode())
     return seen.hexdigest()[:24]
@@ -199,6 +200,7 @@ def _locked(part: Path, how: int) -> TextIO | None:
         log = (part / _LOG).open("a", encoding="utf-8", errors="backslashreplace")
         with suppress(FileNotFoundError, BlockingIOError):
             fcntl.flock(log, how)
+            # while we waited, its owner may have put the folder in place: only the log that lies here now is one
             if os.path.samestat(os.fstat(log.fileno()), (part / _LOG).stat()):
                 return log
         log.close()

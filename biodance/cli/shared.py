@@ -246,6 +246,7 @@ class TimeLeft:
         if done <= self._first:
             return text
         each = (self._clock() - self._began) / (done - self._first)
+        # the item that is told of has begun and is not done: it counts among those left
         return f"{text}, about {seconds_in_words(each * (total - done + 1))} left"
 
 

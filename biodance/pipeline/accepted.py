@@ -84,6 +84,7 @@ def write_corrected(
 def _session_toml(session: Session) -> str:
     """Return what session.toml says of the subject (nothing guessed), an own marker set, plates and trials."""
     subject = session.subject
+    # session.toml tells the mass without devices; reading adds them again
     said = {"mass_kg": subject.mass - sum(subject.devices.values()), "height_m": subject.stature, "age": subject.age}
     guessed = {{"mass": "mass_kg", "stature": "height_m"}.get(what, what) for what in subject.guessed}
     lines = ["[subject]", *(f"{key} = {float(x)}" for key, x in said.items() if np.isfinite(x) and key not in guessed)]

@@ -365,6 +365,7 @@ def make_dance(
         rest = plan.rest if np.isfinite(plan.rest) else None
         dance = replace(dance, plate=plan.plate, subject=subject, care=plan.care, rest=rest)
         tell("counting what the dance tells", 0, 0)
+        # minutes of work that share nothing: two of the three counts run beside, in a process of their own
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
             free = aside.submit(_freer_expectation, dance, plan)
@@ -465,6 +466,7 @@ def preview_parameters(dance: Dance) -> dict[str, dict[str, FileValue]]:
                 found.append((after.start, name.capitalize(), "Foot Strike" if down[1] else "Foot Off"))
     time = np.array([one[0] for one in sorted(found)])
     contexts, labels = ([one[k] for one in sorted(found)] for k in (1, 2))
+    # C3D: times of events are pairs of whole minutes and seconds
     minutes = np.stack([time // 60, time % 60])
     feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "stool" for phase in dance.phases]
     times = np.array([[phase.start, phase.end] for phase in dance.phases]).T

@@ -31,6 +31,7 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
     asked = [one for one in results if one.trial.role != "static" or "static" in roles]
     moving = [(one, one.motion) for one in asked if one.motion is not None and not of_postures(one.motion.time)]
     seconds = [float(np.ptp(motion.time[[0, -1]])) for _, motion in moving]
+    # from 0 to 1 through all trials in turn: what drifts in a session goes on from one to the next
     ends = np.cumsum(seconds)
     return tuple(
         TrialWindow(one.trial, motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1])

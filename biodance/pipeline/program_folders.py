@@ -148,6 +148,7 @@ def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
     angles = motion.q[:, body.nq - len(names) :]
     if not body.n_root:
         return TimeTable(body.name, tuple(names), motion.time, angles)
+    # ground axes x, y up, z right instead of x, y left, z up: R' = U'R, and places p' = U'p (rows: p U)
     turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
     turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
     root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]

@@ -135,6 +135,7 @@ def grouped(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
+    # with False at both ends the places of change are, in turn, the first True and the first False after it
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 

@@ -47,6 +47,7 @@ def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS) -> str
     """Return the picture of the posture ``q`` (nq,) by ``eyes``; ``title`` is read to who cannot see it."""
     views = [(words, silhouettes(body, q, eye)) for words, eye in eyes]
     height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
+    # the first view's height fills the picture; a small robot or a child stays smaller than that
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
     for words, parts in views:
         across = np.concatenate([outline[:, 0] for _, outline, _ in parts])

@@ -45,6 +45,7 @@ def methods_text(document: Mapping[str, Any]) -> str:
     """Return the paragraph as Markdown for the content of a results.json (of report or of identify)."""
     said, cited = [], []
     for clause in CLAUSES:
+        # a clause of which any value is not known is left out, with what it cites
         values = [_value(document, path) for path in clause.keys]
         if any(value is None for value in values):
             continue

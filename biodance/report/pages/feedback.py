@@ -192,6 +192,7 @@ def _same_feet(dance: Dance, p: int, before: int) -> bool:
 def _outline(stance: Stance, side: int) -> Array:
     """Return the outline of a planted sole on the floor, (P, 2) m, in order about its middle."""
     points = stance.soles[side][:, :2]
+    # a sole is convex: its corners in order of their angle about the middle are its outline
     from_middle = points - points.mean(axis=0)
     order = np.argsort(np.arctan2(from_middle[:, 1], from_middle[:, 0]))
     return points[order].round(4)

@@ -139,6 +139,7 @@ _WIDE, _PHONE = _Room(), _Room(430, 110, 1150, 85)
 def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str], *, room: _Room = _WIDE) -> str:
     """Draw ``body`` from the front with ``labels`` (segment -> lines); white is what was not ``measured``."""
     front = silhouettes(body, _spread(body), (1.0, 0.0))
+    # whole mm, and y downwards as in a picture
     outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline, _ in front]
     marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
     middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
@@ -175,6 +176,7 @@ def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: _Room
     own.sort(key=lambda name: middles[name][1])
     x, anchor, last, found = (-room.column if right else room.column), "end" if right else "start", -np.inf, []
     for name in own:
+        # beside its part, or a step below the label before it
         last = max(float(middles[name][1]), last + room.step)
         to, lines = middles[name], labels[name].split("\n")
         found.append(f'<path d="M{x * 0.98:g} {last:g}L{to[0]:g} {to[1]:g}" stroke="{GREY}" stroke-width="4"/>')

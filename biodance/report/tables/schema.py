@@ -150,6 +150,7 @@ class RowFormat(Formatter):
         if format_spec == "count":
             return str(len(value))
         if format_spec.startswith("±"):
+            # sd -> half the width of the 95 % interval
             return f"± {self.format_field(value if value is None else SIGMAS * value, format_spec[1:])}"
         if format_spec == "seen":
             return size_seen(value, self.row["typical"], self.row["unit"])
@@ -175,6 +176,7 @@ def shown(said: str, row: Row) -> str:
 
 def plain_values(value: object) -> Any:
     """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite is None."""
+    # the usual types first, and by identity: a document holds hundreds of thousands of numbers
     if type(value) is float:
         return value if math.isfinite(value) else None
     if type(value) is str or type(value) is int or value is None:
