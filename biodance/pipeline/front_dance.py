@@ -113,7 +113,6 @@ def simulate_dance(
     seed: int,
     performer: Performer = USUAL_PERFORMER,
     hidden: tuple[Hidden, ...] = (),
-    visit: LabVisit = FIRST_VISIT,
 ) -> Path:
     """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats
     for validation; on a stool, which stands on the plate, sitting still and a second round instead.
@@ -132,7 +131,7 @@ def simulate_dance(
     shown = {one.name: one for one in (*danced, *(_on_the_stool(dance, danced) if seated else ()))}
     trials = [one.plan(round(float(np.ptp(one.motion.time)) * performer.pace, 1)) for one in shown.values()]
     plan = Protocol(dance.protocol, "a designed dance", (*others, *trials))
-    visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
+    visit, loads = hide(hidden, subject, plan, seed=seed, visit=FIRST_VISIT)
 
     def performed(instruments: Instruments, person: Person, trial: TrialPlan) -> Performance:
         if trial.name not in shown:
