@@ -15,7 +15,7 @@ from stream_faults import FAULTS
 
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
-from biodance.pipeline.stream import body_and_stream, replay
+from biodance.pipeline.live import body_and_stream, replay
 
 HEADING = (
     "| recording | s | Hz | ms a frame: median, 99 %, most | end against batch, largest difference "

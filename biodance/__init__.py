@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from biodance.motion.dynamics import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
     from biodance.pipeline.dance import DanceResult as DanceResult
-    from biodance.pipeline.diagnosis import SessionDiagnosis as SessionDiagnosis
     from biodance.pipeline.export import export as export
     from biodance.pipeline.front import SessionComparison as SessionComparison
     from biodance.pipeline.front import compare_sessions as compare_sessions
@@ -53,13 +52,14 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
+    from biodance.pipeline.live import stream_recording as stream_recording
     from biodance.pipeline.movement import SessionMovement as SessionMovement
     from biodance.pipeline.movement import describe_movement as describe_movement
     from biodance.pipeline.plates import judge_plates as judge_plates
+    from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
-    from biodance.pipeline.stream import stream_recording as stream_recording
     from biodance.records import FootSizes as FootSizes
     from biodance.records import Markers as Markers
     from biodance.records import Motion as Motion
@@ -86,16 +86,15 @@ HOMES = {
     "motion.dynamics": ("predict_wrench",),
     "motion.track": ("track",),
     "pipeline.dance": ("DanceResult",),
-    "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify", "register"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
+    "pipeline.live": ("stream_recording",),
     "pipeline.movement": ("SessionMovement", "describe_movement"),
     "pipeline.plates": ("judge_plates",),
-    "pipeline.stream": ("stream_recording",),
-    "pipeline.results": ("SessionResult",),
+    "pipeline.results": ("SessionDiagnosis", "SessionResult"),
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),
     "records": ("FootSizes", "Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hidden_faults import hidden
 
-from biodance.app.outputs import keep_acceptance, preview_of_acceptance
 from biodance.app.sessions import Archive
+from biodance.app.window import keep_acceptance, preview_of_acceptance
 from biodance.errors import BiodanceError
 
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from biodance.app.edits import changed_text
+from biodance.app.sessions import changed_text
 from biodance.errors import FileRefused
 
 SCATTERED = """# top

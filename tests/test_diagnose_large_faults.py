@@ -11,7 +11,8 @@ from two_plates import changed, exchanged, foreign, late, session, weak
 from biodance.effects import Recorded
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
-from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.session import examine
 
 

@@ -22,7 +22,7 @@ from squatting import squat
 from biodance.batch.work import SessionStatus, SessionTask, outcome_of, process_session
 from biodance.body.human.human import human
 from biodance.body.solids import segment_solids
-from biodance.cli.virtual import _simulated_anew
+from biodance.cli.dance import _simulated_anew
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import write_whole
 from biodance.lab.session.results_folder import check_results, file_hash, results_folder, whole_folder

@@ -20,9 +20,8 @@ from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.recursive import initial_posterior
 from biodance.motion.kinematics import poses
-from biodance.pipeline.asked import asked_posture, asked_words
-from biodance.pipeline.live import LiveSession, LiveState, StreamWatch
-from biodance.pipeline.stream import body_and_stream, replay
+from biodance.pipeline.live import LiveSession, LiveState, StreamWatch, body_and_stream, replay
+from biodance.pipeline.still import asked_posture, asked_words
 from biodance.records import Markers, Sip, Subject, Wrench
 from biodance.report.live import LivePage
 from biodance.virtual_lab.simulate import simulate_session

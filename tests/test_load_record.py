@@ -13,8 +13,8 @@ from biodance.effects.added_mass import AddedMass
 from biodance.identification.load_words import say_load
 from biodance.identification.loads import nearest_segment
 from biodance.motion.kinematics import poses
-from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.load import with_load, with_weighed_load
+from biodance.pipeline.diagnosis import with_load, with_weighed_load
+from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.trial_result import Check
 from biodance.pipeline.words import alternatives, in_words
 from biodance.report.tables.diagnosis import diagnosis_document

@@ -28,9 +28,9 @@ from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.session import examine, identification_of
 from biodance.report.dance import cards_page
+from biodance.report.laboratory import plates_document, plates_page
 from biodance.report.pages.feedback import write_feedback
 from biodance.report.pages.subject import subject_page
-from biodance.report.plates import plates_document, plates_page
 from biodance.report.write import write_diagnosis, write_report
 
 pytestmark = ASKED

@@ -26,8 +26,7 @@ from biodance.lab.plates.faults import OFFSET, PlateCorrection, corrected_trial,
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline import diagnosis
 from biodance.pipeline.accepted import proven
-from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.records import Plate, Source, Trial, Wrench
 from biodance.spatial import wrench_about_origin
 

@@ -17,7 +17,7 @@ from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
-from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Doubt, Judged, WrongWeight, told_together

@@ -10,7 +10,7 @@ from found_loads import GAIN, NOTHING, OWN, found
 from identified_sessions import session_result
 
 from biodance.identification.load_words import say_load
-from biodance.pipeline.load import as_diagnosed
+from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.vector import round_ticks

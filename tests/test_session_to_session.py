@@ -18,8 +18,8 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Ga
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.identification import identify_body
 from biodance.pipeline.body import starting_from
-from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.front_dance import virtual_subject
+from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.trial_result import trial_fit
 from biodance.records import Session, Subject

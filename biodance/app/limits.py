@@ -1,6 +1,4 @@
-"""A form for what one person can and may do: what it asks in the words of therapists, and the commented file that
-`biodance dance --limits` reads, as `biodance limits --template` writes it.
-"""
+"""A form for what one person can and may do, and the commented file that `biodance dance --limits` reads."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -122,15 +120,10 @@ def _put(document: tomlkit.TOMLDocument, key: str, value: Any, before: Mapping[s
 
 def _by_side(raw: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a file says with each side by itself: ``arm_lift`` of both becomes one of each."""
-    out: dict[str, Any] = dict(raw)
-    for key in (key for key in _SIDED if key in out):
-        table: dict[str, Any] = {}
-        for name, value in out[key].items():
-            bare = plain(name)
-            for one in _sides_of(bare):
-                table[one] = value
-        out[key] = table
-    return out
+    sided = {key: raw[key].items() for key in _SIDED if key in raw}
+    return dict(raw) | {
+        key: {one: value for name, value in table for one in _sides_of(plain(name))} for key, table in sided.items()
+    }
 
 
 def _sides_of(name: str) -> list[str]:

@@ -27,8 +27,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from biodance.app.edits import ChangedElsewhereError
-from biodance.app.sessions import Archive
+from biodance.app.sessions import Archive, ChangedElsewhereError
 from biodance.app.window import Asked, Window
 from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
@@ -78,7 +77,10 @@ class LoopbackGuard:
         """Return the answer to a request that is not let through; None for one that is."""
         if request.headers.get("host", "") not in self._hosts:
             return PlainTextResponse("This address answers to 127.0.0.1 alone.", 403)
-        if request.method not in _READS and not self._own(request):
+        # a write comes from the page of this server, as JSON, which no form can send
+        json = request.headers.get("content-type", "").startswith("application/json")
+        own = json and request.headers.get("origin", "") in [f"http://{host}" for host in self._hosts]
+        if request.method not in _READS and not own:
             return PlainTextResponse("Changes are taken from the window's own page alone.", 403)
         if self._same(request.cookies.get(self._cookie, "")):
             return None
@@ -88,13 +90,8 @@ class LoopbackGuard:
             return answer
         return PlainTextResponse("Open the whole address that biodance app printed, with its token.", 403)
 
-    def _own(self, request: Request) -> bool:
-        """Return whether a write comes from the page of this server, as JSON, which no form can send."""
-        origin = request.headers.get("origin", "")
-        json = request.headers.get("content-type", "").startswith("application/json")
-        return json and origin in [f"http://{host}" for host in self._hosts]
-
     def _same(self, told: str) -> bool:
+        # takes as long wherever the two differ, so that no token can be guessed letter by letter
         return hmac.compare_digest(told.encode(), self._token.encode())
 
 
@@ -115,16 +112,12 @@ _PATIENCE = 10.0  # s that a request's body may take
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
-def _static_files() -> dict[str, bytes]:
-    """Return the window's own files by name: what is not among them cannot be asked for."""
-    folder = files("biodance.app") / "static"
-    found = {one.name: one.read_bytes() for one in folder.iterdir() if Path(one.name).suffix in _KINDS}
-    return found | {"three.js": three_js().encode()}
-
-
 def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGuard:
     """Return the application that serves a window over an ``archive`` to who knows the ``token``, at ``port``."""
-    window, known = Window(archive), _static_files()
+    # the window's own files by name: what is not among them cannot be asked for
+    folder = files("biodance.app") / "static"
+    known = {one.name: one.read_bytes() for one in folder.iterdir() if Path(one.name).suffix in _KINDS}
+    window, known = Window(archive), known | {"three.js": three_js().encode()}
 
     async def static(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
@@ -197,20 +190,8 @@ def _told(sentence: str, status: int) -> JSONResponse:
 def serve_window(
     folder: Path, out: Path, *, port: int = 0, opened: bool = True, tell: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Serve a window over the sessions of a ``folder``, with results in ``out``, until Ctrl-C.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        An archive, or one session.
-    out : pathlib.Path
-        Of the results, as `run_batch` writes them.
-    port : int
-        Of 127.0.0.1; 0 takes a free one.
-    opened : bool
-        Whether the browser is asked to show it.
-    tell : callable
-        Called with the address, once it answers.
+    """Serve a window over a ``folder``, an archive or one session, with results in ``out``, until Ctrl-C; at a ``port``
+    of 127.0.0.1 (0 = a free one), ``opened`` in the browser. ``tell`` is called with the address, once it answers.
 
     Raises
     ------

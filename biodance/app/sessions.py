@@ -1,24 +1,211 @@
-"""The sessions below the folder of a window: which folders it may show and open, what is known of each session without
-reading its recordings, and their runs, one at a time, in a process of its own that a stop kills whole.
-"""
+"""The sessions below a window's folder: which may be shown, their session.toml with every state it had, their runs."""
 
+import hashlib
 import os
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-from biodance.app.edits import SessionText
+import tomlkit
+from tomlkit.container import Container
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AbstractTable
+
 from biodance.batch.run import Ledger, Work, run_here, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
 from biodance.batch.work import OUTCOME, PART, TABLES, SessionTask, clear_up, fingerprint_of, process_session
-from biodance.errors import BiodanceError, refuse_unknown
+from biodance.errors import BiodanceError, FileRefused, refuse_unknown
+from biodance.lab.plain_text import write_whole
 from biodance.lab.session.archive import archive_folders, visit_date
+from biodance.lab.session.file import check_session_text
+from biodance.lab.session.results_folder import made_folder
 from biodance.library import parse_json
+
+KeyChange = tuple[Sequence[str], Any]
+"""Where in session.toml, as ``("subject", "mass_kg")``, and the new value; None takes the key out."""
+_DEEPEST = 4
+
+
+class ChangedElsewhereError(BiodanceError):
+    """session.toml is not as the one who wants to change it has seen it."""
+
+
+class SessionText:
+    """The session.toml of the session in ``folder``, with all states that it had in the folder ``history``.
+
+    States are files ``0001.toml``, ... in the order in which they were; none is ever removed. `undo` goes back along
+    them and `redo` forth; a change after `undo` adds the state gone back to, and then the new one.
+    """
+
+    def __init__(self, folder: Path, history: Path) -> None:
+        self.path, self._history, self._lock = folder / "session.toml", history, Lock()
+        self._at: int | None = None
+
+    @property
+    def text(self) -> str:
+        """What the file says; "" where there is none."""
+        try:
+            return self.path.read_bytes().decode("utf-8-sig") if self.path.exists() else ""
+        except UnicodeDecodeError as error:
+            raise FileRefused(f"{self.path}: is no text in UTF-8, so not valid TOML. Save it as UTF-8.") from error
+        except OSError as error:
+            raise FileRefused(f"{self.path}: cannot be opened ({error.strerror}). Check the path.") from error
+
+    @property
+    def revision(self) -> str:
+        """What changes whenever the file does."""
+        content = self.path.read_bytes() if self.path.is_file() else b""
+        return hashlib.sha256(content).hexdigest()[:16]
+
+    @property
+    def steps(self) -> tuple[bool, bool]:
+        """Whether there is a state to go back to, and one to go forth to."""
+        states, at = self._states(), self._position()
+        # changed elsewhere: going back leads to what was written here last, and nothing lies ahead
+        changed = bool(states) and _read(states[at]) != self.text
+        return at > 0 or changed, at < len(states) - 1 and not changed
+
+    def change(self, changes: Sequence[KeyChange], revision: str) -> None:
+        """Change keys of the file, which must be as at the ``revision``; comments and order stay.
+
+        Raises
+        ------
+        ChangedElsewhereError
+            It is not.
+        BiodanceError
+            What would stand there is not legal: nothing is written.
+        """
+        with self._lock:
+            self._same(revision)
+            self._write(changed_text(self.text, changes))
+
+    def replace(self, text: str, revision: str) -> None:
+        """Write another text, as `change`."""
+        with self._lock:
+            self._same(revision)
+            self._write(text)
+
+    def undo(self, revision: str) -> None:
+        """Go back to the state before; nothing where there is none."""
+        with self._lock:
+            self._same(revision)
+            self._keep()
+            self._go(self._position() - 1)
+
+    def redo(self, revision: str) -> None:
+        """Go forth to the state that was undone; nothing where there is none."""
+        with self._lock:
+            self._same(revision)
+            self._go(self._position() + 1)
+
+    def _same(self, revision: str) -> None:
+        if revision != self.revision:
+            raise ChangedElsewhereError(
+                f"{self.path.name} was changed elsewhere in the meantime. It is shown as it is now; make your change "
+                f"again."
+            )
+
+    def _write(self, text: str) -> None:
+        check_session_text(self.path, text)
+        if text == self.text:
+            return
+        self._keep()
+        if self._position() < len(self._states()) - 1:
+            self._add(self.text)
+        self._add(text)
+        self._put(text)
+
+    def _keep(self) -> None:
+        """Keep what stands there now as the last state, unless it is the one that was written here."""
+        states, now = self._states(), self.text
+        if not states or _read(states[self._position()]) != now:
+            self._add(now)
+
+    def _add(self, text: str) -> None:
+        number = len(self._states()) + 1
+        write_whole(made_folder(self._history) / f"{number:04}.toml", text.encode())
+        self._at = number - 1
+
+    def _go(self, at: int) -> None:
+        states = self._states()
+        if 0 <= at < len(states):
+            self._put(_read(states[at]))
+            self._at = at
+
+    def _put(self, text: str) -> None:
+        if text:
+            write_whole(self.path, text.encode(), over=True)
+        else:
+            self.path.unlink(missing_ok=True)  # the state of no file; an empty one says no more
+
+    def _states(self) -> list[Path]:
+        return sorted(self._history.glob("*.toml"))
+
+    def _position(self) -> int:
+        return len(self._states()) - 1 if self._at is None else self._at
+
+
+def _read(path: Path) -> str:
+    return path.read_bytes().decode("utf-8")
+
+
+def changed_text(text: str, changes: Sequence[KeyChange]) -> str:
+    """Return a TOML text with keys set or taken out and all else as before; FileRefused where that cannot be."""
+    try:
+        document = tomlkit.parse(text)
+        for keys, value in changes:
+            _set(document, list(keys), value)
+        return tomlkit.dumps(document)
+    except (TOMLKitError, TypeError, ValueError) as error:
+        raise FileRefused(f"session.toml: cannot be changed ({error}). Correct it as text first.") from error
+
+
+def _set(document: Container, keys: list[str], value: Any) -> None:
+    if not 1 <= len(keys) <= _DEEPEST or not all(isinstance(key, str) and key for key in keys):
+        raise ValueError(f"{keys!r} is no key")
+    if value is None:
+        return _take_out(document, keys)
+    table: Any = document
+    for depth, key in enumerate(keys[:-1]):
+        if key not in table:
+            table[key] = tomlkit.table(is_super_table=depth < len(keys) - 2)
+        table = table[key]
+    table[keys[-1]] = _inline(value)
+    return None
+
+
+def _inline(value: Any) -> Any:
+    """Return a value as it is written on one line, whatever it holds."""
+    if isinstance(value, list):
+        array = tomlkit.array()
+        array.extend(map(_inline, value))
+        return array
+    if isinstance(value, dict):
+        table = tomlkit.inline_table()
+        table.update(value)
+        return table
+    return tomlkit.item(value)
+
+
+def _take_out(document: Container, keys: list[str]) -> None:
+    """Take a key out, and tables that hold nothing more."""
+    tables: list[Any] = [document]
+    for key in keys[:-1]:
+        if key not in tables[-1]:
+            return
+        tables.append(tables[-1][key])
+    for table, key in zip(reversed(tables), reversed(keys), strict=True):
+        inner = table.get(key)
+        if key == keys[-1] and table is tables[-1]:
+            table.pop(key, None)
+        elif isinstance(inner, AbstractTable) and not inner and not tomlkit.dumps(inner.value).strip():
+            table.pop(key)  # Empty, and no comment stands in it
 
 
 def allowed_folder(path: str, roots: Sequence[Path]) -> Path:
@@ -27,7 +214,7 @@ def allowed_folder(path: str, roots: Sequence[Path]) -> Path:
         found = Path(path).resolve(strict=True)
     except (OSError, RuntimeError, ValueError) as error:
         raise BiodanceError(f"{path}: there is no such folder ({error}). Choose another one.") from error
-    if not any(root == found or root in found.parents for root in roots):
+    if not any(found.is_relative_to(root) for root in roots):
         legal = ", ".join(map(str, roots))
         raise BiodanceError(f"{path}: is not in {legal}. Start biodance app with that folder to work in it.")
     if not found.is_dir():
@@ -36,9 +223,7 @@ def allowed_folder(path: str, roots: Sequence[Path]) -> Path:
 
 
 def folders_document(path: str, roots: Sequence[Path]) -> dict[str, Any]:
-    """Return a ``folder`` ("" = the last of the ``roots``), the one ``above`` it ("" = none that may be shown), and the
-    names of the ``folders`` in it; hidden ones, files, and links that lead elsewhere are left out.
-    """
+    """Return a ``folder`` ("" = the last root), the one ``above`` it ("" = none), and ``folders`` in it."""
     folder = allowed_folder(path or str(roots[-1]), roots)
     try:
         below = sorted((one for one in folder.iterdir() if not one.name.startswith(".")), key=lambda one: one.name)
@@ -50,10 +235,9 @@ def folders_document(path: str, roots: Sequence[Path]) -> dict[str, Any]:
 
 
 def _within(path: Path, roots: Sequence[Path]) -> bool:
-    try:
+    with suppress(BiodanceError):
         return bool(allowed_folder(str(path), roots))
-    except BiodanceError:
-        return False
+    return False
 
 
 HISTORY = "history"
@@ -67,9 +251,7 @@ def results_beside(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class SessionPlace:
-    """One session of the window: its ``name`` below the archive, the ``folder`` of its recordings, the folder
-    ``results``, and its session.toml (``file``).
-    """
+    """One session by its ``name`` below the archive: ``folder`` of its recordings, ``results``, session.toml."""
 
     name: str
     folder: Path
@@ -82,9 +264,7 @@ class SessionPlace:
         return SessionTask(self.name, folder, out, fingerprint_of(self.folder, ()), tables=True)
 
     def found(self) -> dict[str, Any] | None:
-        """Return what became of the session in the last run, whether that is of the recordings as they are now
-        (``fresh``), and whether it wrote ``tables``; None where there was none.
-        """
+        """Return what the last run made of the session, and whether of its present files (``fresh``); or None."""
         try:
             told = parse_json((self.results / OUTCOME).read_text(encoding="utf-8"))
             row: dict[str, Any] = next(iter(told["rows"]), {})
@@ -96,17 +276,13 @@ class SessionPlace:
 
 
 class Archive:
-    """The sessions of a ``folder``, which is an archive or one session, with their results in ``out``.
-
-    Raises
-    ------
-    BiodanceError
-        There is no session, or the results would lie among the recordings.
+    """The sessions of a ``folder``, which is an archive or one session, with their results in ``out``. Raises
+    BiodanceError: there is no session, or the results would lie among the recordings.
     """
 
     def __init__(self, folder: Path, out: Path) -> None:
         self.folder, self.out = folder, out
-        if out.resolve() in (folder.resolve(), *folder.resolve().parents):
+        if folder.resolve().is_relative_to(out.resolve()):
             raise BiodanceError(f"{out}: results must not lie among the recordings. Choose another --out.")
         self._places: dict[str, SessionPlace] = {}
         self.look()
@@ -115,17 +291,14 @@ class Archive:
 
     def look(self) -> None:
         """Look again which sessions there are."""
-        known, here = self._places, self.folder.resolve()
-        results = self.out.resolve()
-        places = {}
+        known, results, self._places = self._places, self.out.resolve(), {}
         for path in archive_folders(self.folder)[0]:
-            if results in (path.resolve(), *path.resolve().parents):
-                continue
-            below = path.relative_to(self.folder)
-            name = below.as_posix() if below.parts else here.name
-            file = SessionText(path, self.out / HISTORY / folder_name(name))
-            places[name] = known.get(name) or SessionPlace(name, path, self.out / SESSIONS / folder_name(name), file)
-        self._places = places
+            if not path.resolve().is_relative_to(results):
+                below = path.relative_to(self.folder)
+                name = below.as_posix() if below.parts else self.folder.resolve().name
+                file = SessionText(path, self.out / HISTORY / folder_name(name))
+                place = SessionPlace(name, path, self.out / SESSIONS / folder_name(name), file)
+                self._places[name] = known.get(name, place)
 
     def __getitem__(self, name: str) -> SessionPlace:
         """Return a session by its name; UnknownName where there is none, so that no other path can be asked for."""
@@ -184,13 +357,7 @@ class Worker:
         self._thread: threading.Thread | None = None
 
     def start(self, places: Sequence[SessionPlace]) -> None:
-        """Begin a run over some sessions.
-
-        Raises
-        ------
-        BiodanceError
-            Another run is not finished.
-        """
+        """Begin a run over some sessions. Raises BiodanceError: another run is not finished."""
         with self._lock:
             if self.running:
                 raise BiodanceError("Another run is not finished. Wait for it, or stop it.")
@@ -227,20 +394,15 @@ class Worker:
         except BiodanceError as error:
             state, run.why = RunState.FAILED, str(error)
         except Exception as error:
-            state, run.why = (
-                RunState.FAILED,
-                f"{self._archive.out}: cannot be worked in ({error}). Make room, or run again.",
-            )
+            state = RunState.FAILED
+            run.why = f"{self._archive.out}: cannot be worked in ({error}). Make room, or run again."
         run.seconds, run.state = time.monotonic() - run.began, state
 
 
 def _last_line(folder: Path) -> str:
     """Return what the worker said last, without the time."""
     for log in folder.glob(f"{PART}*/{_LOG}"):
-        try:
-            lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-        except OSError:
-            continue
-        if lines:
-            return lines[-1][20:]
+        with suppress(OSError):
+            if lines := log.read_text(encoding="utf-8", errors="replace").splitlines():
+                return lines[-1][20:]
     return ""

@@ -1,6 +1,4 @@
-"""What a window computes in a process of its own and prints as JSON: ``python -m biodance.app.tasks TASK ARGUMENTS``.
-Nothing of a session is touched.
-"""
+"""What a window computes in a process of its own: ``python -m biodance.app.tasks TASK ARGUMENTS`` prints JSON."""
 
 import json
 import sys
@@ -10,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from biodance.app.edits import KeyChange, changed_text
+from biodance.app.sessions import KeyChange, changed_text
 from biodance.cycles.cut import gait_cycles, is_left_out, replaced_events
 from biodance.cycles.strides import STRIDE_UNITS, mean_values, strides
 from biodance.effects import SessionEntry
@@ -26,8 +24,8 @@ from biodance.pipeline.accepted import CORRECTED
 from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import read_kept
-from biodance.pipeline.session import examine
-from biodance.records import FootEvent, Trial
+from biodance.pipeline.session import followed
+from biodance.records import FootEvent
 from biodance.report.tables.schema import plain_values
 
 
@@ -36,18 +34,14 @@ def residual_rows(before: SessionResult, after: SessionResult) -> list[dict[str,
     measured less simulated wrench (N, N·m; the table's body), and the distance of the markers from the body (mm); None
     = not known.
     """
-    rows, later = _rms(before), _rms(after)
-    return [{"trial": name, "before": rms, "after": later[name]} for name, rms in rows.items() if name in later]
-
-
-def _rms(result: SessionResult) -> dict[str, list[float | None]]:
-    found: dict[str, list[float | None]] = {}
-    for one in result.trials:
-        compared = one.comparison is not None and one.comparison.used.any()
-        wrench = one.comparison.rms.tolist() if compared and one.comparison else [None] * 6
-        if compared or one.fit:
-            found[one.name] = [*wrench, 1000 * one.fit.total_rms if one.fit else None]
-    return found
+    rms: list[dict[str, list[float | None]]] = [{}, {}]
+    for found, result in zip(rms, (before, after), strict=True):
+        for one in result.trials:
+            compared = one.comparison is not None and one.comparison.used.any()
+            wrench = one.comparison.rms.tolist() if compared and one.comparison else [None] * 6
+            if compared or one.fit:
+                found[one.name] = [*wrench, 1000 * one.fit.total_rms if one.fit else None]
+    return [{"trial": name, "before": one, "after": rms[1][name]} for name, one in rms[0].items() if name in rms[1]]
 
 
 _Finding = Mapping[str, Any]
@@ -62,11 +56,11 @@ def proposed_correction(folder: Path, findings: Sequence[_Finding]) -> dict[str,
     BiodanceError
         session.toml cannot correct one of them, or it is not found any more.
     """
-    before = examine(read_session(folder))
+    before = followed(read_session(folder))  # what segments weigh is asked of neither
     changes = [change for one in findings for change in CORRECTIONS[SessionEntry(one["session_entry"])](before, one)]
     joined = _together(changes)
     with _as_changed(folder, joined) as other:
-        after = examine(read_session(other))
+        after = followed(read_session(other))
     return {"changes": joined, "residuals": residual_rows(before, after)}
 
 
@@ -110,21 +104,15 @@ def _exchanged_plates(result: SessionResult, finding: _Finding) -> Iterator[KeyC
     if of is None:
         raise BiodanceError(f"{' and '.join(names)}: no recording has both plates now. Run the session again.")
     for name, other in zip(names, reversed(names), strict=True):
-        yield ["plates", name, "channels"], _channels(of, other)
-
-
-def _channels(trial: Trial, name: str) -> list[str | int]:
-    plate = next(one for one in trial.plates if one.name == name)
-    labels, _ = plate_channels(plate, trial)
-    if not labels:
-        raise BiodanceError(f"{name}: its channels have no names. Accept the correction: it writes copies.")
-    return list(labels)
+        labels, _ = plate_channels(next(one for one in of.plates if one.name == other), of)
+        if not labels:
+            raise BiodanceError(f"{other}: its channels have no names. Accept the correction: it writes copies.")
+        yield ["plates", name, "channels"], list(labels)
 
 
 def _weighed_mass(result: SessionResult, finding: _Finding) -> Iterator[KeyChange]:
     """Yield the mass as the plates have it, without devices."""
-    error = finding["parameters"]["error"]["value"]
-    person = result.session.subject
+    error, person = finding["parameters"]["error"]["value"], result.session.subject
     yield ["subject", "mass_kg"], round(person.mass - sum(person.devices.values()) + error, 1)
 
 
@@ -200,8 +188,7 @@ def _residuals(session: str, accepted: str) -> list[dict[str, Any]]:
     corrected = Path(accepted) / CORRECTED
     if not corrected.is_dir():
         return []
-    before, after = (examine(read_session(folder)) for folder in (Path(session), corrected))
-    return residual_rows(before, after)
+    return residual_rows(*(followed(read_session(folder)) for folder in (Path(session), corrected)))
 
 
 TASKS: Mapping[str, Callable[..., Any]] = {

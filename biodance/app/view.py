@@ -20,7 +20,7 @@ from biodance.lab.session.entries import plate_channels
 from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
-from biodance.records import ROLES, Array, Markers, Plate, Session, Trial, runs
+from biodance.records import ROLES, Markers, Session, Trial, runs
 from biodance.report.pages.template import packed_numbers
 from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import EVENT_ROW
@@ -43,27 +43,25 @@ def markers_document(trial: Trial) -> dict[str, Any]:
         worn = read_marker_set(trial.marker_set)
         segments = {label: worn.marker(own).segment for own, label in worn.match(markers.names).items()}
     filled = fill_gaps(markers, segments)[0]  # as a run would fill them
+    # -(-a // b) rounds up: so many frames are left out between two that at most `_FRAMES` stay
     chosen = np.arange(0, markers.time.size, max(1, -(-markers.time.size // _FRAMES)))
     xyz = filled.xyz[chosen]
     origin = np.nanmean(markers.xyz, axis=(0, 1)).round(4)
+    # places are whole numbers of 16 bits, and the furthest is 30,000 steps from the origin
     unit = max(1e-4, float(np.nanmax(np.abs(xyz - origin))) / 30000)
     drawn = filled.filled if filled.filled.size else np.zeros(markers.seen.shape, dtype=bool)
     spans = {"gaps": ~markers.seen, "filled": drawn}
-    return dict(
-        plain_values(
-            {
-                "names": markers.names,
-                "start_s": float(markers.time[0]),
-                "step_s": float(np.median(np.diff(markers.time[chosen]))) if chosen.size > 1 else 0.0,
-                "frames": chosen.size,
-                "origin": origin,
-                "unit": unit,
-                "places": packed_numbers((xyz - origin) / unit),
-                "plates": [plate.corners.round(4) for plate in trial.plates],
-                **{key: _spans(markers, mask) for key, mask in spans.items()},
-            }
-        )
-    )
+    told = {
+        "names": markers.names,
+        "start_s": float(markers.time[0]),
+        "step_s": float(np.median(np.diff(markers.time[chosen]))) if chosen.size > 1 else 0.0,
+        "frames": chosen.size,
+        "origin": origin,
+        "unit": unit,
+        "places": packed_numbers((xyz - origin) / unit),
+        "plates": [plate.corners.round(4) for plate in trial.plates],
+    }
+    return dict(plain_values(told | {key: _spans(markers, mask) for key, mask in spans.items()}))
 
 
 def _spans(markers: Markers, mask: Any) -> dict[str, list[list[float]]]:
@@ -82,22 +80,12 @@ def forces_document(trial: Trial) -> dict[str, Any]:
         time, force = plate.wrench.time, plate.wrench.value[:, 2]
         chosen = np.arange(0, time.size, max(1, -(-time.size // _POINTS)))
         path = plate.wrench.cop(height=plate.height, threshold=_LOADED)[chosen, :2]
-        rows.append(
-            {
-                "name": plate.name,
-                "time_s": time[chosen].round(4),
-                "force_n": force[chosen].round(1),
-                "cop_m": path[np.isfinite(path).all(axis=1)].round(4),
-            }
-        )
-    return {"plates": plain_values(rows), "ends_s": _ends(trial)}
-
-
-def _ends(trial: Trial) -> list[float]:
-    """Return when a trial begins and ends, s."""
-    clocks: list[Array] = [trial.markers.time] if trial.markers is not None else []
-    clocks += [plate.wrench.time for plate in trial.plates]
-    return [float(min(time[0] for time in clocks)), float(max(time[-1] for time in clocks))] if clocks else [0.0, 0.0]
+        cop = path[np.isfinite(path).all(axis=1)].round(4)
+        about = {"time_s": time[chosen].round(4), "force_n": force[chosen].round(1), "cop_m": cop}
+        rows.append({"name": plate.name} | about)
+    clocks = [one.time for one in (trial.markers, *(plate.wrench for plate in trial.plates)) if one is not None]
+    ends = [float(min(time[0] for time in clocks)), float(max(time[-1] for time in clocks))] if clocks else [0.0, 0.0]
+    return {"plates": plain_values(rows), "ends_s": ends}
 
 
 class PlacedBy(StrEnum):
@@ -207,7 +195,9 @@ class SessionView:
     def _labels(self, recorded: list[Markers], worn: MarkerSet | None) -> list[dict[str, Any]]:
         """Return every label with its place, who says so, how much of it is not seen, and in how many trials it is."""
         labels = sorted({label for markers in recorded for label in plain_labels(markers.names)})
-        places, named, gaps = _places(worn) if worn else {}, meanings_of(labels), _gaps(recorded)
+        places, named, gaps = _places(worn) if worn else {}, meanings_of(labels), dict[str, float]()
+        for gap in (gap for markers in recorded for gap in report_gaps(markers)):  # the worst trial's
+            gaps[gap.label] = max(gaps.get(gap.label, 0.0), gap.percent)
         return [
             {
                 "label": label,
@@ -227,14 +217,6 @@ class SessionView:
         if not worn.name.startswith(GUESSED):
             return PlacedBy.SET
         return PlacedBy.NAME if place in named else PlacedBy.POSTURE
-
-
-def _gaps(recorded: list[Markers]) -> dict[str, float]:
-    """Return by label the largest share of a trial, %, in which it is not seen."""
-    found: dict[str, float] = {}
-    for one in (gap for markers in recorded for gap in report_gaps(markers)):
-        found[one.label] = max(found.get(one.label, 0.0), one.percent)
-    return found
 
 
 def _places(worn: MarkerSet) -> dict[str, str]:
@@ -275,11 +257,10 @@ def _plates(session: Session, said: SessionFile) -> Iterator[dict[str, Any]]:
             labels, _ = plate_channels(plate, trial)
             row |= {"type": plate.type, "corners_m": plate.corners.round(5), "placed": plate.placed}
             row |= {"channels": labels, "decisions": plate.decisions}
-            row["loads"] = [{"trial": trial.name, **_load(plate)} for trial, plate in on]
+            row["loads"] = []
+            for trial, plate in on:
+                force = plate.wrench.value[:, 2]
+                force = force[np.isfinite(force)]
+                mean, most = (float(force.mean()), float(force.max())) if force.size else (None, None)
+                row["loads"].append({"trial": trial.name, "mean_n": mean, "most_n": most})
         yield row
-
-
-def _load(plate: Plate) -> dict[str, Any]:
-    force = plate.wrench.value[:, 2]
-    known = force[np.isfinite(force)]
-    return {"mean_n": float(known.mean()) if known.size else None, "most_n": float(known.max()) if known.size else None}

@@ -1,22 +1,213 @@
-"""What the pages of a window ask for, each question a method; how they are asked is `server`'s."""
+"""What the pages of a window ask for, each question a method, and what a run has left of a session to be shown."""
 
+import io
 import json
+import shutil
+import subprocess
+import tempfile
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
+import numpy as np
 from starlette.responses import Response
 
-from biodance.app import outputs
 from biodance.app.limits import limits_form, limits_text
 from biodance.app.sessions import Archive, SessionPlace, Worker, allowed_folder, folders_document, results_beside
 from biodance.app.view import SessionView, forces_document, markers_document
-from biodance.errors import BiodanceError
+from biodance.batch.summary import folder_name
+from biodance.batch.work import TABLES
+from biodance.child_process import run_python
+from biodance.errors import BiodanceError, UnknownName, refuse_unknown
+from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
 from biodance.records import Trial
+from biodance.report.files import for_spreadsheets
 from biodance.version import __version__
+
+_LONGEST = 600.0  # s that a program started for one download may take
+_MOST_ROWS = 20_000  # Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)
+_PARTS: Mapping[str, tuple[str, ...]] = {
+    "gait": ("movement", "gait"),
+    "body": ("body", "replay", "masses", "predicts", "torques", "impact", "load", "danced", "changes", "standing"),
+    "quality": ("figures", "checks", "trials", "made"),
+}
+"""Sections of report.html by the tab that shows them."""
+_OF_TRIALS, _FOLDERS = ("c3d", "trc", "mot"), ("opensim", "bids")
+EXPORTS = (*_OF_TRIALS, *_FOLDERS, "osim", "urdf")
+"""Formats that are offered; a folder is handed out as .zip."""
+_SHOWN = ("attention", "judged", "checks", "subject", "mass_check", "refused", "steps")
+_FINDING = ("effect", "target", "trials", "parameters", "probability", "gain", "advice", "session_entry")
+
+
+def read_results(place: SessionPlace) -> dict[str, Any]:
+    """Return the content of results.json. Raises BiodanceError: there are no results, or they are damaged."""
+    try:
+        return dict(parse_json((place.results / "results.json").read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise BiodanceError(f"{place.name}: has no results yet. Run it.") from None
+    except (OSError, ValueError) as error:
+        raise BiodanceError(f"{place.results}: the results cannot be read ({error}). Run it again.") from error
+
+
+def shown_results(place: SessionPlace) -> dict[str, Any]:
+    """Return what the tabs Steps, Quality and Files show of the results."""
+    found = read_results(place)
+    told = found["diagnosis"] or {}
+    kept = check_results(place.results)
+    moved = (found["movement"] or {"trials": []})["trials"]
+    return {
+        **{key: found.get(key) for key in _SHOWN},
+        "status": told.get("status"),
+        "reasons": told.get("reasons", []),
+        "findings": [{key: one.get(key) for key in _FINDING} for one in told.get("findings", [])],
+        "trials": [{key: one[key] for key in ("name", "role", "status", "reason")} for one in found["trials"]],
+        "moved": [{key: one[key] for key in ("trial", "events", "cycles")} for one in moved],
+        "files": sorted(kept.manifest.outputs) if kept else [],
+        "folder": str(place.results),
+        "exports": [{"format": name, "of_trial": name in _OF_TRIALS} for name in EXPORTS],
+        "tables": (place.results / TABLES).is_dir(),
+    }
+
+
+def page_part(place: SessionPlace, part: str) -> str:
+    """Return report.html with the sections of one ``part`` alone; the whole page for "" and where it has none."""
+    page = _file(place, "report.html").read_text(encoding="utf-8")
+    if not part:
+        return page
+    kept = [one for one in _PARTS.get(part, ()) if f'<section id="{one}">' in page]
+    if not kept:
+        return _NOTHING
+    shown = ", ".join(f"#{one}" for one in kept)
+    alone = f"<style>body > header, main > :not({shown}) {{ display: none; }}</style></head>"
+    return page.replace("</head>", alone, 1)
+
+
+_NOTHING = """<!doctype html><html lang="en"><title>biodance</title>
+<p style="font: 15px sans-serif">The last run has nothing to show here.</p></html>"""
+
+
+def results_file(place: SessionPlace, name: str) -> Path:
+    """Return a file that the run wrote; BiodanceError for every other path."""
+    kept = check_results(place.results)
+    if kept is None or name not in kept.manifest.outputs:
+        raise UnknownName.of("file of the results", name, tuple(kept.manifest.outputs) if kept else ())
+    return _file(place, name)
+
+
+def _file(place: SessionPlace, name: str) -> Path:
+    if not (place.results / name).is_file():
+        raise BiodanceError(f"{place.name}: there is no {name}. Run it.")
+    return place.results / name
+
+
+def _tables(place: SessionPlace) -> list[Path]:
+    if found := sorted((place.results / TABLES).glob("*.parquet")):
+        return found
+    raise BiodanceError(f"{place.name}: its results have no tables yet. Run it.")
+
+
+def workbook(place: SessionPlace) -> bytes:
+    """Return the tables of the results as .xlsx, one sheet each; those by frame are left to CSV and Parquet."""
+    import pandas as pd
+
+    buffer, kept = io.BytesIO(), dict[str, pd.DataFrame]()
+    about = [f"Session {place.name}", f"Tables with units in their headings; all in {place.results / TABLES}."]
+    for name, table in ((path.stem, pd.read_parquet(path)) for path in _tables(place)):
+        by_frame = len(table) > _MOST_ROWS or name.endswith(("residuals", "angle_states"))
+        about.append(f"{name}: {len(table)} rows{', as CSV and Parquet alone' if by_frame else ''}.")
+        if not by_frame:
+            kept[name] = table
+    options = {"options": {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}}
+    with pd.ExcelWriter(buffer, engine="xlsxwriter", engine_kwargs=options) as book:
+        pd.Series(about).to_excel(book, sheet_name="about", index=False, header=False)
+        for name, table in kept.items():
+            known = for_spreadsheets(table.replace([np.inf, -np.inf], np.nan))
+            known.to_excel(book, sheet_name=name[:31], index=False, freeze_panes=(1, 1))
+            book.sheets[name[:31]].autofit(max_width=300)
+    return buffer.getvalue()
+
+
+def csv_archive(place: SessionPlace) -> bytes:
+    """Return all tables of the results as CSV in a .zip."""
+    paths = [path.with_suffix(".csv") for path in _tables(place)]
+    return _zipped({path.name: path for path in paths})
+
+
+def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
+    """Return name and content of the results in the format of another program; of one ``trial`` where it holds one.
+    Raises BiodanceError: it cannot be written; the sentence is that of ``biodance export``.
+    """
+    refuse_unknown("format", kind, EXPORTS)
+    stem = folder_name(f"{place.name}_{trial}" if trial else place.name).replace(" ", "_")
+    with tempfile.TemporaryDirectory(prefix="biodance-") as folder:
+        out = Path(folder) / (f"{stem}_{kind}" if kind in _FOLDERS else f"{stem}.{kind}")
+        chosen = [f"--trial={trial}"] if trial and kind in _OF_TRIALS else []
+        run_command("export", str(place.results), f"--format={kind}", f"--out={out}", *chosen)
+        if out.is_dir():
+            inside = (path for path in sorted(out.rglob("*")) if path.is_file())
+            return f"{out.name}.zip", _zipped({path.relative_to(out).as_posix(): path for path in inside})
+        return out.name, out.read_bytes()
+
+
+def _zipped(paths: Mapping[str, Path]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, path in paths.items():
+            packed.write(path, name)
+    return buffer.getvalue()
+
+
+def run_command(*arguments: str, module: str = "biodance") -> str:
+    """Run a command of biodance in a process of its own and return what it prints; BiodanceError says why it failed."""
+    try:
+        done = run_python("-m", module, *arguments, timeout=_LONGEST)
+    except subprocess.TimeoutExpired:
+        raise BiodanceError(f"biodance {arguments[0]} gave no answer within {_LONGEST:.0f} s and was ended.") from None
+    if done.returncode not in (0, 1):
+        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        raise BiodanceError(said[-1] if said else f"biodance {arguments[0]} ended with code {done.returncode}.")
+    return done.stdout.decode("utf-8", "replace")
+
+
+def run_task(task: str, *arguments: str) -> Any:
+    """Return what one of `tasks.TASKS` answers, in a process of its own; BiodanceError says why it failed."""
+    return parse_json(run_command(task, *arguments, module="biodance.app.tasks"))
+
+
+def preview_of_acceptance(place: SessionPlace, out: Path) -> dict[str, Any]:
+    """Diagnose a session and write what acceptance would write into a folder beside; return before and after:
+    ``residuals`` as `tasks.residual_rows`; ``written`` files with what they are, ``not_applied`` causes with why. The
+    recordings are not touched; the folder is gone where it fails.
+    """
+    folder = out / "accepted" / f"{folder_name(place.name)} (preview)"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        command = run_command("diagnose", str(place.folder), "--accept", f"--out={folder}", "--force", "--json")
+        accepted = parse_json(command).get("accepted") or {}
+        residuals = run_task("residuals", str(place.folder), str(folder))
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return {"residuals": residuals} | {key: accepted.get(key, []) for key in ("written", "not_applied", "corrections")}
+
+
+def keep_acceptance(place: SessionPlace, out: Path) -> Path:
+    """Put what `preview_of_acceptance` wrote in a place of its own; BiodanceError where there is nothing."""
+    kept = out / "accepted" / folder_name(place.name)
+    preview = kept.with_name(f"{kept.name} (preview)")
+    if not preview.is_dir():
+        raise BiodanceError(f"{place.name}: there is nothing to keep. Look at before and after first.")
+    if kept.exists():
+        names = (kept.with_name(f"{kept.name} {number}") for number in range(2, 10_000))
+        kept = next(path for path in names if not path.exists())
+    preview.rename(kept)
+    return kept
+
 
 _SANDBOX = "sandbox allow-scripts allow-popups allow-modals; frame-ancestors 'self'"
 """What a page of results may do in a tab: run its own scripts, and reach nothing of the window's."""
@@ -81,22 +272,24 @@ class Window:
         if not isinstance(changes, list) or not all(isinstance(one, list) and len(one) == 2 for one in changes):
             raise BiodanceError('changes must be a list of [["subject", "mass_kg"], 70] or with null.')
         place = self._place(asked)
-        place.file.change([(keys if isinstance(keys, list) else [keys], value) for keys, value in changes], _at(asked))
+        place.file.change(
+            [(keys if isinstance(keys, list) else [keys], value) for keys, value in changes], asked.text("revision")
+        )
         return self.session(asked)
 
     def text(self, asked: Asked) -> dict[str, Any]:
         """Write session.toml as text."""
-        self._place(asked).file.replace(asked.text("text"), _at(asked))
+        self._place(asked).file.replace(asked.text("text"), asked.text("revision"))
         return self.session(asked)
 
     def undo(self, asked: Asked) -> dict[str, Any]:
         """Go back to the session.toml before."""
-        self._place(asked).file.undo(_at(asked))
+        self._place(asked).file.undo(asked.text("revision"))
         return self.session(asked)
 
     def redo(self, asked: Asked) -> dict[str, Any]:
         """Take the last undo back."""
-        self._place(asked).file.redo(_at(asked))
+        self._place(asked).file.redo(asked.text("revision"))
         return self.session(asked)
 
     def markers(self, asked: Asked) -> dict[str, Any]:
@@ -109,15 +302,15 @@ class Window:
 
     def results(self, asked: Asked) -> dict[str, Any]:
         """Return what the last run found."""
-        return outputs.shown_results(self._place(asked))
+        return shown_results(self._place(asked))
 
     def strides(self, asked: Asked) -> dict[str, Any]:
         """Return the spatio-temporal values of a trial in the last run, and with session.toml as it is now."""
         place, trial = self._place(asked), self._trial(asked)
-        outputs.read_results(place)
+        read_results(place)
         about = (str(place.results), str(place.folder), trial.name, trial.source.path.stem)
         with self._one_export:
-            return {"rows": outputs.run_task("strides", *about)}
+            return {"rows": run_task("strides", *about)}
 
     def run(self, asked: Asked) -> dict[str, Any]:
         """Begin a run over sessions."""
@@ -134,7 +327,7 @@ class Window:
 
     def page(self, asked: Asked) -> Response:
         """Return a part of report.html, or all of it."""
-        text = outputs.page_part(self._place(asked), asked.text("part"))
+        text = page_part(self._place(asked), asked.text("part"))
         return Response(text, media_type="text/html", headers={"Content-Security-Policy": _SANDBOX})
 
     def download(self, asked: Asked) -> Response:
@@ -144,26 +337,26 @@ class Window:
         place, kind = self._place(asked), asked.text("format")
         stem = place.folder.resolve().name
         if kind == "file":
-            path = outputs.results_file(place, asked.text("file"))
+            path = results_file(place, asked.text("file"))
             return _attached(path.name, path.read_bytes())
         with self._one_export:
             if kind == "xlsx":
-                return _attached(f"{stem}.xlsx", outputs.workbook(place))
+                return _attached(f"{stem}.xlsx", workbook(place))
             if kind == "csv":
-                return _attached(f"{stem}_tables.zip", outputs.csv_archive(place))
-            return _attached(*outputs.exported(place, kind, asked.text("trial")))
+                return _attached(f"{stem}_tables.zip", csv_archive(place))
+            return _attached(*exported(place, kind, asked.text("trial")))
 
     def correction(self, asked: Asked) -> dict[str, Any]:
         """Return what session.toml would say for findings to be taken off, and what that changes: before and after."""
         place, wanted = self._place(asked), asked.body.get("findings")
-        found = (outputs.read_results(place)["diagnosis"] or {}).get("findings", [])
+        found = (read_results(place)["diagnosis"] or {}).get("findings", [])
         able = {f"{one['effect']} {one['target']}": one for one in found if one.get("session_entry")}
         if not isinstance(wanted, list) or not wanted or not set(wanted) <= able.keys():
             raise BiodanceError(f"findings must be some that session.toml can correct: {', '.join(able) or 'none is'}.")
         keys = ("target", "trials", "parameters", "session_entry")
         asked_of = [{key: able[name][key] for key in keys} for name in wanted]
         with self._one_export:
-            return dict(outputs.run_task("correction", str(place.folder), json.dumps(asked_of)))
+            return dict(run_task("correction", str(place.folder), json.dumps(asked_of)))
 
     def form(self, _: Asked) -> dict[str, Any]:
         """Return what the form for a person's limits asks."""
@@ -179,11 +372,11 @@ class Window:
     def accept(self, asked: Asked) -> dict[str, Any]:
         """Return what acceptance would change: before and after."""
         with self._one_export:
-            return outputs.preview_of_acceptance(self._place(asked), self.archive.out)
+            return preview_of_acceptance(self._place(asked), self.archive.out)
 
     def keep(self, asked: Asked) -> dict[str, Any]:
         """Keep what was accepted."""
-        return {"folder": str(outputs.keep_acceptance(self._place(asked), self.archive.out))}
+        return {"folder": str(keep_acceptance(self._place(asked), self.archive.out))}
 
     def _place(self, asked: Asked) -> SessionPlace:
         return self.archive[asked.text("name")]
@@ -200,10 +393,6 @@ class Window:
         if view.session is None:
             raise BiodanceError(view.why)
         return view.session[asked.text("trial")]
-
-
-def _at(asked: Asked) -> str:
-    return asked.text("revision")
 
 
 def _attached(name: str, content: bytes) -> Response:

@@ -66,6 +66,7 @@ def run_here(
     """
     lost, stop = deque[SessionTask](), stop or threading.Event()
     yield from _beside(deque(tasks), work, workers, lost, stop)
+    # one at a time: what died beside others, of their memory perhaps, may get through alone
     for _ in range(TRIES - 1):
         again, lost = lost, deque[SessionTask]()
         yield from _beside(again, work, 1, lost, stop)
@@ -77,10 +78,7 @@ def run_here(
 def _beside(
     waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask], stop: threading.Event
 ) -> Outcomes:
-    """Yield what is finished until all is, or ``stop`` is set; the tasks whose process died go to ``lost``.
-
-    Each worker is a pool of one process: the death of a process ends every process of its pool.
-    """
+    """Yield what is finished until ``stop``; each worker is a pool of one, so that a death takes no other along."""
     free = [_process() for _ in range(min(workers, len(waiting)))]
     flying = dict[Future[Outcome], tuple[SessionTask, ProcessPoolExecutor]]()
     try:
@@ -117,15 +115,12 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, task: SessionTask) -> Futu
 
 
 def _killed(task: SessionTask) -> Outcome:
-    """Return the outcome of a session that nobody survives."""
     why = f"Its process was ended from outside {TRIES} times (memory?). Report it alone to see why."
     return untold(task, SessionStatus.FAILED, why, Why.MACHINE)
 
 
 def prepare_workers() -> None:
-    """Start the process from which workers are forked and let it load what they need, so that the first is quick; the
-    filters, too, which every session imports when it comes to them.
-    """
+    """Start the process from which workers are forked, and let it load what every session needs."""
     multiprocessing.get_context("forkserver").set_forkserver_preload(
         ["biodance.pipeline.front", "biodance.report.write", "scipy.signal"]
     )
@@ -143,8 +138,7 @@ def end_with_parent() -> None:
     """End this process as soon as the one that asked for it is gone, and at once by Ctrl-C."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
+    if (parent := multiprocessing.parent_process()) is not None:
 
         def watch() -> None:
             parent.join()
@@ -197,10 +191,7 @@ def _on_cluster(
     alone: deque[SessionTask] | None,
     places: Callable[[], int],
 ) -> Outcomes:
-    """Yield what is finished until all is, with as many tasks sent as there are ``places``.
-
-    Dask blames a worker's death on all that it held: such a task goes to ``alone``, or, without it, is given up.
-    """
+    """Yield what is finished; what Dask blames for a worker's death goes to ``alone``, without it is given up."""
     import distributed as dask
 
     flying, finished = dict[dask.Future, SessionTask](), dask.as_completed()
@@ -239,12 +230,8 @@ ON CONFLICT (name) DO UPDATE SET fingerprint = excluded.fingerprint, status = ex
 
 
 class Ledger:
-    """The book of one archive's results, open for one run.
-
-    Raises
-    ------
-    BiodanceError
-        The folder holds something else, the results of another archive, or another run is writing into it.
+    """The book of one archive's results, open for one run. Raises BiodanceError: the folder holds something else, the
+    results of another archive, or another run is writing into it.
     """
 
     def __init__(self, folder: Path, archive: Path) -> None:
@@ -258,6 +245,7 @@ class Ledger:
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = (folder / _LOCK).open("w", encoding="utf-8")
         try:
+            # goes with the process, however that ends
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self._lock.close()
@@ -307,18 +295,8 @@ class Ledger:
 
 @dataclass(frozen=True)
 class BatchRun:
-    """What a run over an archive came to.
-
-    Parameters
-    ----------
-    archive, folder : pathlib.Path
-        Of the recordings and of the results.
-    outcomes : tuple of Outcome
-        One for every session of the archive, of this run or an earlier one, by name.
-    fresh : int
-        Sessions gone through in this run.
-    left_out : tuple of str
-        Tables of recordings that are no sessions.
+    """What a run over an ``archive`` came to in a ``folder``: an outcome of every session, of this run (``fresh`` many)
+    or an earlier one; ``left_out`` are tables of recordings that are no sessions.
     """
 
     archive: Path
@@ -352,32 +330,12 @@ def run_batch(
     """Go through every session of an archive and write page, numbers and log of each, and the summary of all.
 
     A run that was stopped is gone on with by the same call: sessions that are done with the recordings, settings and
-    version of now are not gone through again.
-
-    Parameters
-    ----------
-    archive : str or pathlib.Path
-        Folder with session folders at any depth.
-    out : str or pathlib.Path
-        Folder for the results: empty, new, or of an earlier run over this archive.
-    workers : int or str, optional
-        Processes of this machine, by default one for each core; or the address of a Dask scheduler whose workers see
-        both folders.
-    chosen : tuple of str
-        Settings, such as ``filter.cutoff=6``.
-    pages : bool
-        Whether a page is drawn for every session.
-    limit : float
-        s after which a session is given up.
-    work : callable
-        What is done with one session; for tests.
-    tell : callable, optional
-        Called with what is being done, how many sessions are finished, and of how many.
-
-    Returns
-    -------
-    BatchRun
-        What became of every session; ``summary.parquet``, ``summary.csv`` and ``report.html`` in ``out``.
+    version of now are not gone through again. ``archive`` holds session folders at any depth; ``out`` is empty, new, or
+    of an earlier run over it, and gets ``summary.parquet``, ``summary.csv`` and ``report.html``. ``workers`` are
+    processes of this machine, by default one for each core, or the address of a Dask scheduler whose workers see both
+    folders; ``chosen`` settings, such as ``filter.cutoff=6``; ``pages`` whether a page is drawn for every session;
+    ``limit`` s after which a session is given up; ``work`` what is done with one, for tests; ``tell`` is called with
+    what is being done, how many sessions are finished, and of how many.
 
     Raises
     ------
@@ -387,16 +345,15 @@ def run_batch(
     archive, folder = Path(archive), Path(out)
     assignments(chosen)
     sessions, indices = archive_folders(archive)
-    if folder.resolve() in (archive.resolve(), *archive.resolve().parents):
+    if archive.resolve().is_relative_to(folder.resolve()):
         raise BiodanceError(f"{folder}: results must not lie among the recordings. Choose another --out.")
     if isinstance(workers, int) and workers < 1:
         raise BiodanceError(f"--workers {workers}: at least one process is needed. Leave it out for one a core.")
     if not limit > 0:
         raise BiodanceError(f"--limit {limit:g}: legal is more than 0 s for one session.")
-    results = folder.resolve()
     tasks = []
     for path in sessions:
-        if results not in (path.resolve(), *path.resolve().parents):
+        if not path.resolve().is_relative_to(folder.resolve()):
             below = path.relative_to(archive)  # as it is called there, also where it is a link to another disk
             name, fingerprint = readable(below if below.parts else archive.resolve().name), fingerprint_of(path, chosen)
             place = os.path.abspath(folder / SESSIONS / folder_name(name))  # workers of a cluster work elsewhere
@@ -433,10 +390,7 @@ def _work_off(
     work: Work,
     tell: Callable[[str, int, int], None],
 ) -> int:
-    """Go through all tasks that are open, write down each as it is finished, and return how many were open.
-
-    What counts is the outcome in a session's folder: where it is missing, damaged, or not final, the session is open.
-    """
+    """Go through tasks that are not final in their folders, write each down, and return how many were open."""
     known = {task.name: found for task in tasks if (found := outcome_of(task))}
     open_tasks = [task for task in tasks if not (task.name in known and known[task.name].is_final(task))]
     ledger.note(known.values())  # finished when a run was killed
@@ -458,14 +412,13 @@ def _work_off(
 
 def summary_of(run: BatchRun) -> dict[str, Any]:
     """Return what a run came to, for programs."""
+    unread = [one for one in run.outcomes if one.unread]
     return {
         "archive": str(run.archive),
         "sessions": len(run.outcomes),
         "fresh": run.fresh,
         "counts": run.counts,
-        "not_done": [
-            {"session": one.name, "status": one.status, "reason": one.reason} for one in run.outcomes if one.unread
-        ],
+        "not_done": [{"session": one.name, "status": one.status, "reason": one.reason} for one in unread],
         "left_out": list(run.left_out),
         "seconds": round(sum(one.seconds for one in run.outcomes), 1),
         "peak_memory_mb": max((one.memory_mb for one in run.outcomes), default=None),

@@ -1,5 +1,6 @@
 """All sessions of an archive in one table and on one page."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -40,25 +41,16 @@ def summary_table(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
     """Return one row for each trial of every session; a session that was not read has one row with its reason."""
     import pandas as pd
 
-    rows = [
-        {
-            **row,
-            "session": one.name,
-            "session_status": one.status,
-            "reason": row.get("reason") or "",
-            "seconds": one.seconds,
-            "memory_mb": one.memory_mb,
-        }
-        for one in outcomes
-        for row in (one.rows or ({"trial": "", "status": one.status, "reason": one.reason},))
-    ]
+    rows = []
+    for one in outcomes:
+        about = {"session": one.name, "session_status": one.status, "seconds": one.seconds, "memory_mb": one.memory_mb}
+        for row in one.rows or ({"trial": "", "status": one.status, "reason": one.reason},):
+            rows.append({**row, **about, "reason": row.get("reason") or ""})
     return pd.DataFrame(rows, columns=list(ROW_TYPES)).astype(ROW_TYPES)
 
 
 def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out: Sequence[str] = ()) -> None:
-    """Write ``summary.parquet``, ``summary.csv`` and ``report.html`` of an archive into ``folder``; an earlier summary
-    is replaced whole.
-    """
+    """Write ``summary.parquet``, ``summary.csv`` and ``report.html`` of an archive over an earlier summary."""
     table = summary_table(outcomes)
     with whole_file(folder / "summary.parquet", over=True) as part:
         table.to_parquet(part, index=False)
@@ -70,9 +62,7 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
 
 
 def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
-    """Return what stands out from the archive's own median by more than `_FAR` robust standard deviations (MAD): one
-    entry for each session and quantity, the worst trial; at least eight sessions are needed to call one strange.
-    """
+    """Return each session's worst trial by quantity, beyond `_FAR` robust sd (MAD) of at least eight sessions."""
     found = []
     for column, (what, unit, factor) in _KEY.items():
         known = table[["session", "trial", column]].dropna()
@@ -80,26 +70,19 @@ def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
             continue
         value = known[column].to_numpy() * factor
         middle = float(np.median(value))
+        # 1.4826 times the median absolute deviation is the sd of normal values
         spread = 1.4826 * float(np.median(np.abs(value - middle)))
         far = known.assign(value=value, away=np.abs(value - middle) / max(spread, 1e-12))
         worst = far[far["away"] > _FAR].sort_values("away", ascending=False).drop_duplicates("session")
-        found += [
-            {
-                "session": one.session,
-                "trial": one.trial,
-                "what": what,
-                "value": f"{one.value:.1f} {unit}",
-                "usual": f"{middle:.1f} ± {spread:.1f} {unit}",
-            }
-            for one in worst.itertuples()
-        ]
+        usual = f"{middle:.1f} ± {spread:.1f} {unit}"
+        for one in worst.itertuples():
+            far_off = f"{one.value:.1f} {unit}"
+            found.append({"session": one.session, "trial": one.trial, "what": what, "value": far_off, "usual": usual})
     return found
 
 
 def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ...]:
-    """Return what is left of the sessions ``names`` whose results lie in the ``folder`` of an archive; sessions that
-    were not diagnosed are left out.
-    """
+    """Return what is left of those sessions ``names`` in an archive's ``folder`` that were diagnosed."""
     found = []
     for name in names:
         path = folder / SESSIONS / folder_name(name) / "results.json"
@@ -148,22 +131,19 @@ def _page(
     from biodance.pipeline.saved_results import now
     from biodance.report.figures.style import svg_address
     from biodance.report.pages.template import print_sheet, render, template_text
-    from biodance.report.wording import moment, signed
-    from biodance.version import __version__
+    from biodance.report.wording import signed
 
     drawn, made = _figure(table), now()
     first = table.drop_duplicates("session").set_index("session")
     return render(
         "archive.html.j2",
         filters={"signed": signed},
-        style=Markup(template_text("page.css") + print_sheet(name, {}, f"biodance {__version__}, {moment(made)}")),
+        style=Markup(template_text("page.css")) + print_sheet(name, {}, made),
         name=name,
         created=made,
         outcomes=outcomes,
         unread=[one for one in outcomes if one.unread],
-        counts={
-            status: sum(one.status == status for one in outcomes) for status in sorted({o.status for o in outcomes})
-        },
+        counts=dict(sorted(Counter(one.status for one in outcomes).items())),
         verdicts=first["verdict"].dropna().value_counts().to_dict(),
         findings=first.loc[first["findings"].fillna("") != "", "findings"].to_dict(),
         mass=first["mass_difference_percent"].dropna().to_dict(),

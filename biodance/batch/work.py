@@ -1,6 +1,4 @@
-"""One session of an archive, in a process of its own: page, numbers, log, and an outcome that is there whole or not:
-done, refused or failed, and whether that is final.
-"""
+"""One session of an archive in a process of its own: page, numbers, log, and an outcome that is whole or not there."""
 
 import ctypes
 import errno
@@ -41,9 +39,7 @@ TrialRows = tuple[dict[str, Any], ...]
 
 
 class Why(StrEnum):
-    """What a result hangs on. Only what hangs on the recordings is final: the machine may have room another time, the
-    limit may be higher then.
-    """
+    """What a result hangs on; only what hangs on the recordings is final: room or limit may be larger another time."""
 
     SESSION = "session"
     MACHINE = "machine"
@@ -51,9 +47,7 @@ class Why(StrEnum):
 
 
 class SessionStatus(StrEnum):
-    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, did not get
-    through.
-    """
+    """Refused: the recordings cannot be used. Failed: biodance, or the machine, did not get through."""
 
     DONE = "done"
     NEEDS_A_PERSON = "needs a person"
@@ -63,24 +57,10 @@ class SessionStatus(StrEnum):
 
 @dataclass(frozen=True)
 class SessionTask:
-    """One session to go through.
-
-    Parameters
-    ----------
-    name : str
-        The session's folder below the archive.
-    session, out : str
-        Folders of the recordings and of the results.
-    fingerprint : str
-        Of the recordings, the settings and the version (`fingerprint_of`).
-    chosen : tuple of str
-        Settings, such as ``filter.cutoff=6``.
-    pages : bool
-        Whether the page is drawn; numbers are written always.
-    limit : float
-        s after which the session is given up.
-    tables : bool
-        Whether the results are also written as tables, into the folder `TABLES`.
+    """One session to go through: its ``name`` below the archive, the folders of its recordings (``session``) and
+    results (``out``), the `fingerprint_of` recordings, settings and version; the settings ``chosen``
+    (``filter.cutoff=6``), whether ``pages`` are drawn and ``tables`` written, and s after which it is given up
+    (``limit``).
     """
 
     name: str
@@ -95,24 +75,9 @@ class SessionTask:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one session.
-
-    Parameters
-    ----------
-    name, fingerprint : str
-        Of its `SessionTask`.
-    status : SessionStatus
-        What became of it.
-    reason : str
-        Why, where it is not done; else the first thing that a person must see.
-    rows : tuple of dict
-        One for each trial, of plain values.
-    seconds, memory_mb : float
-        It took, and the process had at most.
-    why : Why
-        What it hangs on.
-    limit : float
-        s that it was given.
+    """What became of one session, ``name`` and ``fingerprint`` as its task's: the ``reason`` why it is not done, else
+    the first thing to be seen; ``rows`` of plain values by trial; ``seconds`` it took and was given (``limit``), the
+    most memory it had (``memory_mb``); and ``why``, what that hangs on.
     """
 
     name: str
@@ -144,13 +109,12 @@ def untold(task: SessionTask, status: SessionStatus, reason: str, why: Why) -> O
 
 
 def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
-    """Return what changes when recordings, settings or version change: of names, sizes and times of the files, those
-    that tell of the subject in the folder above included.
-    """
+    """Return what changes with names, sizes or times of the recordings (and FILES above), settings, version."""
     seen = hashlib.sha256(repr((__version__, sorted(chosen))).encode())
     above = (session.resolve().parent / name for name in FILES)
     for path in (*sorted(session.rglob("*")), *above):
         if path.is_file():
+            # size and time stand for the content: to hash a whole archive would take hours at every start
             known, name = path.stat(), os.path.relpath(path, session)
             seen.update(repr((name, known.st_size, known.st_mtime_ns)).encode())
     return seen.hexdigest()[:24]
@@ -215,9 +179,7 @@ def process_session(task: SessionTask) -> Outcome:
 
 @contextmanager
 def _written_alone(place: Path) -> Iterator[tuple[Path, TextIO]]:
-    """Yield an empty folder beside ``place``, and the log in it, as soon as no other process writes the same results:
-    on a cluster, the worker of a client that was killed. What is there at the end is removed.
-    """
+    """Yield an empty folder beside ``place`` and its log, as soon as no other process writes these results."""
     part = place.parent / f"{PART}{hashlib.sha256(os.fsencode(place.name)).hexdigest()[:24]}"
     while (log := _locked(part, fcntl.LOCK_EX)) is None:
         pass
@@ -238,6 +200,7 @@ def _locked(part: Path, how: int) -> TextIO | None:
         log = (part / _LOG).open("a", encoding="utf-8", errors="backslashreplace")
         with suppress(FileNotFoundError, BlockingIOError):
             fcntl.flock(log, how)
+            # while we waited, its owner may have put the folder in place: only the log that lies here now is one
             if os.path.samestat(os.fstat(log.fileno()), (part / _LOG).stat()):
                 return log
         log.close()
@@ -255,9 +218,7 @@ def clear_up(folder: Path) -> None:
 def _attempt(
     task: SessionTask, folder: Path, tell: Callable[[str], None]
 ) -> tuple[Outcome, dict[str, str], Mapping[str, Value]]:
-    """Return what became of a session, the hashes of its recordings and its settings; what is raised becomes a
-    status.
-    """
+    """Return what became of a session, hashes of its recordings, and settings; what is raised becomes a status."""
     status, why = SessionStatus.FAILED, Why.MACHINE
     try:
         with _limited(task.limit):
@@ -313,9 +274,7 @@ def _examined(
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise `_OutOfTimeError` when what follows takes longer; in a thread that is not the main one, as those of a Dask
-    worker, as soon as it is back from machine code.
-    """
+    """Raise `_OutOfTimeError` when what follows takes longer; in a Dask worker's thread once machine code ends."""
     if threading.current_thread() is not threading.main_thread():
         with _limited_thread(seconds):
             yield
@@ -374,13 +333,14 @@ _OF_TRIAL = ("role", "status", "reason", "frames", "rate_hz", "gaps_percent", "m
 
 
 def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-    """Return one row for each trial of a session (results.json): what it is, how well it was followed, what its plates
-    say, what moved; trials that were refused have a row, too.
-    """
+    """Return one row for each trial of a session's results.json, those that were refused included."""
     moved = {one["trial"]: one for one in (document["movement"] or {"trials": ()})["trials"]}
     mass, diagnosis = document["mass_check"] or {}, document["diagnosis"] or {}
+    verdict = "not judged"  # nothing was named and no second could be compared, as with plates alone
+    if diagnosis and (diagnosis["findings"] or any(row["seconds"] > 0 for row in diagnosis["judged"])):
+        verdict = "cannot tell" if diagnosis["status"] == "cannot tell" else str(diagnosis["verdict"])
     shared = {
-        "verdict": _verdict(diagnosis),
+        "verdict": verdict,
         "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
         "first": document["attention"][0]["text"] if document["attention"] else "",
         "declared_mass_kg": document["subject"]["mass_kg"],
@@ -391,7 +351,10 @@ def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         {
             "trial": trial["name"],
             **{name: trial[name] for name in _OF_TRIAL},
-            **{f"fz_rms_{body}_n": _vertical(trial["wrench"], body) for body in ("table", "identified")},
+            **{
+                f"fz_rms_{body}_n": found["rms"][2] if (found := (trial["wrench"] or {}).get(body)) else None
+                for body in ("table", "identified")
+            },
             **(_moved(moved[trial["name"]]) if trial["name"] in moved else {}),
             "warnings": len(trial["warnings"]),
             **shared,
@@ -402,21 +365,6 @@ def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         {"trial": name, "status": "refused", "reason": why, **shared} for name, why in document["refused"].items()
     )
     return (*rows, *refused)
-
-
-def _verdict(diagnosis: dict[str, Any]) -> str:
-    """Return the verdict on a session: "not judged" where nothing was named and no second could be compared, as with
-    plates alone, "cannot tell" where evidence is short.
-    """
-    if not diagnosis or not (diagnosis["findings"] or any(row["seconds"] > 0 for row in diagnosis["judged"])):
-        return "not judged"
-    return "cannot tell" if diagnosis["status"] == "cannot tell" else str(diagnosis["verdict"])
-
-
-def _vertical(wrench: dict[str, Any] | None, body: str) -> float | None:
-    """Return the RMS of vertical force between plates and the simulation with one ``body``, N; None where unknown."""
-    found = wrench.get(body) if wrench else None
-    return float(found["rms"][2]) if found and found["rms"][2] is not None else None
 
 
 def _moved(one: dict[str, Any]) -> dict[str, Any]:

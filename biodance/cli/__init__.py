@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, dance, diagnose, files, session, virtual
+from biodance.cli import archive, dance, files, session
 from biodance.cli.shared import DONE, NOT_DONE, STOPPED, app, say
 
-__all__ = ["app", "archive", "dance", "diagnose", "files", "main", "run", "session", "virtual"]
+__all__ = ["app", "archive", "dance", "files", "main", "run", "session"]
 
 
 _NEW_OBJECTS = 1_000_000
@@ -40,7 +40,10 @@ def run(tokens: Sequence[str] | None = None) -> int:
         say("The output was closed before all was written to it. What went into files is complete.")
     except OSError as error:
         why = error.strerror or f"cannot be written ({error}). Is the disk full?"
-        say(f"{error.filename or _out(tokens)}: {why.rstrip('.')}.")
+        given = list(sys.argv[1:] if tokens is None else tokens)  # where to write to, if the fault does not tell
+        at = given.index("--out") + 1 if "--out" in given else len(given)
+        place = error.filename or (given[at] if at < len(given) else "biodance")
+        say(f"{place}: {why.rstrip('.')}.")
     except Exception as error:
         if "BIODANCE_TRACEBACK" in os.environ:
             raise
@@ -61,13 +64,6 @@ def _misused(error: CycloptsError) -> str:
     one, says = error.argument, error.argument.parameter.help
     name = one.name if one.index is None else one.name.lstrip("-").upper()
     return f"{name} is missing{f': {says}' if says else '.'}"
-
-
-def _out(tokens: Sequence[str] | None) -> str:
-    """Return the place that a command was asked to write to, for a fault that does not tell its path."""
-    given = list(sys.argv[1:] if tokens is None else tokens)
-    at = given.index("--out") + 1 if "--out" in given else len(given)
-    return given[at] if at < len(given) else "biodance"
 
 
 def _onto_nothing(number: int) -> None:

@@ -211,7 +211,7 @@ def live_command(
     subject
         Subject to read if a C3D file contains several.
     """
-    from biodance.pipeline.stream import body_and_stream, replay
+    from biodance.pipeline.live import body_and_stream, replay
     from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line
     from biodance.settings import assignments
 

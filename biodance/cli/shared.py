@@ -1,12 +1,10 @@
-"""Shared by all commands: the application, exit codes, common options and terminal output; what is being done and how
-long it will take, on stderr: one updated line on a terminal, else a plain line every few seconds.
-"""
+"""Shared by all commands: application, exit codes, options, output, and on stderr how long it will take."""
 
 import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -104,9 +102,7 @@ SubjectOption = Annotated[
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Options for reading a session: subject, marker set, settings, and results of earlier sessions (reference, body,
-    laboratory file).
-    """
+    """Options for reading a session: subject, marker set, settings, and what earlier sessions left."""
 
     reference: ReferenceOption = None
     body: BodyOption = None
@@ -126,10 +122,8 @@ class Reading:
 
     def given(self) -> tuple[str, ...]:
         """Return the names of the options that were given."""
-        names = {"chosen": "--set"}
-        return tuple(
-            names.get(one.name, f"--{one.name}") for one in fields(self) if getattr(self, one.name) != one.default
-        )
+        given = [one.name for one in fields(self) if getattr(self, one.name) != one.default]
+        return tuple("--set" if name == "chosen" else f"--{name}" for name in given)
 
 
 USUAL_READING = Reading()
@@ -220,17 +214,13 @@ class Results:
 
     def show_page(self, folder: Path) -> None:
         """Show the page of a results folder in the browser, where that is wanted; say where it lies without one."""
-        if not self.open_page:
-            return
         import webbrowser
 
         page = folder / "report.html"
-        try:
-            opened = webbrowser.open(page.resolve().as_uri())
-        except webbrowser.Error:
-            opened = False
-        if not opened:
-            say(f"No browser was found here. Open {page} on a machine that has one.")
+        with suppress(webbrowser.Error):
+            if not self.open_page or webbrowser.open(page.resolve().as_uri()):
+                return
+        say(f"No browser was found here. Open {page} on a machine that has one.")
 
 
 _COUNTED, _EVERY = re.compile(r"(?P<done>\d+) of (?P<all>\d+)"), 5.0
@@ -242,10 +232,7 @@ class TimeLeft:
     """Estimate of the time left in a stage from its progress messages ("3 of 11"); ``clock`` in s."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._stage = ("", 0)
-        self._began = 0.0
-        self._first = 0
+        self._clock, self._stage, self._began, self._first = clock, ("", 0), 0.0, 0
 
     def said(self, text: str) -> str:
         """Return the words with the time left in this stage, where they count its items."""
@@ -259,6 +246,7 @@ class TimeLeft:
         if done <= self._first:
             return text
         each = (self._clock() - self._began) / (done - self._first)
+        # the item that is told of has begun and is not done: it counts among those left
         return f"{text}, about {seconds_in_words(each * (total - done + 1))} left"
 
 

@@ -1,3 +1,1 @@
-"""One session through all stages: read, prepared, scaled, tracked, compared. A step that fails is a status with a
-reason.
-"""
+"""One session through all stages, from read to exported; a step that fails is a status with a reason."""

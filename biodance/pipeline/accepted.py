@@ -9,7 +9,7 @@ nobody moves, or the finding changes nothing, they tell nothing of it.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import compress
@@ -25,7 +25,7 @@ from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.repairs import failed_check
 from biodance.display import cause_in_words, spaced
-from biodance.effects import Case, DiscreteEffect, Effect, NamedCause, QualityCheck, Recorded
+from biodance.effects import Case, Cause, NamedCause, QualityCheck, Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
@@ -91,10 +91,9 @@ def write_corrected(
 
 
 def _session_toml(session: Session) -> str:
-    """Return what is known of the subject (nothing guessed), a marker set of the user's own and the roles, as a
-    session.toml says them.
-    """
+    """Return what session.toml says of the subject (nothing guessed), an own marker set, plates and trials."""
     subject = session.subject
+    # session.toml tells the mass without devices; reading adds them again
     said = {"mass_kg": subject.mass - sum(subject.devices.values()), "height_m": subject.stature, "age": subject.age}
     guessed = {{"mass": "mass_kg", "stature": "height_m"}.get(what, what) for what in subject.guessed}
     lines = ["[subject]", *(f"{key} = {float(x)}" for key, x in said.items() if np.isfinite(x) and key not in guessed)]
@@ -109,20 +108,14 @@ def _session_toml(session: Session) -> str:
     feet = {f"plate{n}": plate.foot for trial in session.trials for n, plate in enumerate(trial.plates, start=1)}
     for name, foot in feet.items():
         lines += ["", f"[plates.{name}]", f'foot = "{foot}"'] * bool(foot)
-    for trial in session.trials:
-        lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"', *_said_of(trial)]
+    for trial in session.trials:  # what it says of labels is done in the copy
+        spans = [[one.start, one.end, *([one.side] if one.side else [])] for one in trial.left_out]
+        kinds = {True: "strike", False: "off"}
+        events = [f'{{side = "{e.side}", kind = "{kinds[e.down]}", time = {e.time}}}' for e in trial.events]
+        lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"']
+        lines += [f"leave_out = {json.dumps(spans)}"] * bool(spans)
+        lines += [f"events = [{', '.join(events)}]"] * bool(events)
     return "\n".join(lines) + "\n"
-
-
-def _said_of(trial: Trial) -> Iterator[str]:
-    """Yield what session.toml says of the steps of a trial: what it says of labels is done in the copy."""
-    spans = [[one.start, one.end, *([one.side] if one.side else [])] for one in trial.left_out]
-    kinds = {True: "strike", False: "off"}
-    events = [f'{{side = "{e.side}", kind = "{kinds[e.down]}", time = {e.time}}}' for e in trial.events]
-    if spans:
-        yield f"leave_out = {json.dumps(spans)}"
-    if events:
-        yield f"events = [{', '.join(events)}]"
 
 
 def with_right_labels(
@@ -154,9 +147,7 @@ def with_right_labels(
 
 
 def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tuple[Written, ...], tuple[str, ...]]:
-    """Write a copy of every C3D file with exchanged labels put right into ``folder``/mended; return what was written,
-    and why others could not be. Every other byte is as in the recording.
-    """
+    """Write copies of C3D files, labels put right, else byte by byte, into ``folder``/mended; what, and what not."""
     written, refused = [], []
     for trial in session.trials:
         pairs, file = right.exchanged.get(trial.name, {}), trial.source.path
@@ -170,17 +161,22 @@ def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tup
     return tuple(written), tuple(refused)
 
 
+def _undone(trial: Trial, found: Iterable[tuple[Cause, QualityCheck]]) -> Trial:
+    """Return a trial as read without what was found in it."""
+    for kind, one in found:
+        trial = kind.undone(trial, one) if trial.plates and one.meant(trial) else trial
+    return trial
+
+
 _ROUNDS = 3
 """How often it is looked again: with one fault undone, another one shows."""
-
-_Cause = Effect | DiscreteEffect
 
 
 def with_faults_undone(
     result: SessionResult,
     recorded: Recorded,
     mended: MendedCopy | None,
-    chosen: Mapping[str, _Cause],
+    chosen: Mapping[str, Cause],
     *,
     reference: SessionIdentification | None,
     tell: Callable[[str], None],
@@ -211,14 +207,6 @@ def with_faults_undone(
     return MendedCopy(result, exchanged, (*checks, *found)), recorded
 
 
-def _undone(trial: Trial, found: Iterable[tuple[_Cause, QualityCheck]]) -> Trial:
-    """Return a trial as read without what was found in it."""
-    for kind, one in found:
-        if trial.plates and one.meant(trial):
-            trial = kind.undone(trial, one)
-    return trial
-
-
 _Mend = Callable[[Case], Case]
 _Fits = tuple[Fit, ...]
 _SAME = 0.01
@@ -227,9 +215,7 @@ _SAME = 0.01
 
 @dataclass(frozen=True, eq=False)
 class _Corrected:
-    """A session corrected for some causes: the body ``identified``, and what bodies leave of the data that were
-    ``used`` for them and of those that were not (``kept``; both None where the movement is too short to be parted).
-    """
+    """The body ``identified`` without some causes; what bodies leave of data ``used`` and ``kept`` (None: too few)."""
 
     identified: Identification
     used: Residuals | None
@@ -293,16 +279,20 @@ def proven(one: Finding, prior: Mapping[Key, float]) -> bool:
     """
     if not (one.effect in _INSIDE or one.cause.of_person()) or one.gain is None or not one.gain.proven:
         return False
+    # P(this cause) = P(any of the set) x its share of the set, by log Bayes factor + log prior of each member
     logs = np.array([alias.log_bayes_factor + prior.get((alias.effect, alias.target), 0.0) for alias in one.set])
     same = np.array([alias.effect == one.effect for alias in one.set])
     shares = np.exp(logs - logs.max())
     return bool(one.probability * shares[same].sum() / shares.sum() >= NAMED)
 
 
-def accepted(result: SessionResult, inferred: Inferred, before: Identification) -> SessionDiagnosis:
-    """Return the diagnosis with what accepting its findings changes against the identification ``before``. A finding
-    whose own gain lies wholly at or below zero is taken back, the worst first, and the rest accepted again.
+def accepted(result: SessionResult, inferred: Inferred, before: Identification | None) -> SessionDiagnosis:
+    """Return the diagnosis with what accepting its findings changes against the identification ``before``, None where
+    nothing was identified. A finding whose own gain lies wholly at or below zero is taken back, the worst first, and
+    the rest accepted again.
     """
+    if not inferred.named or before is None:
+        return SessionDiagnosis(inferred.diagnosis, inferred, before)
     while inferred.diagnosis.findings:
         try:
             found = _accepted(result, inferred, before)
@@ -317,7 +307,11 @@ def accepted(result: SessionResult, inferred: Inferred, before: Identification) 
         worst = min(gains, key=lambda k: sum(gains[k])) if gains else None
         if worst is None or found.inferred is None:
             return found
-        inferred = noted(found.inferred.without(worst), _taken_back_words(found.findings[worst]))
+        gone, (low, high) = found.findings[worst], (-100 * x for x in reversed(gains[worst]))
+        said = f"accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
+        inferred = noted(
+            found.inferred.without(worst), f"{cause_in_words(gone.effect, gone.target)} was taken back: {said}"
+        )
     return SessionDiagnosis(inferred.diagnosis, inferred, before)
 
 
@@ -329,16 +323,7 @@ def noted(inferred: Inferred, *notes: str) -> Inferred:
 def _phi(result: SessionResult, found: Inferred) -> Array:
     """Return the parameters (10N,) in use: those of the posterior, the table's where only observations judge."""
     assert result.body is not None
-    phi = found.phi
-    return phi if phi.size else result.body.sip.phi
-
-
-def _taken_back_words(gone: Finding) -> str:
-    """Return why a finding was taken back."""
-    assert gone.gain is not None
-    low, high = (-100 * x for x in reversed(gone.gain.ci95))
-    name = cause_in_words(gone.effect, gone.target)
-    return f"{name} was taken back: accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
+    return found.phi if found.phi.size else result.body.sip.phi
 
 
 def _accepted(result: SessionResult, inferred: Inferred, before: Identification) -> SessionDiagnosis:
@@ -361,9 +346,7 @@ def _accepted(result: SessionResult, inferred: Inferred, before: Identification)
 
 
 def _gain_of_person(result: SessionResult, inferred: Inferred, index: int, before: Identification) -> Gain | None:
-    """Return what a finding of the person gains against sides alike: by the halves of the movement, as trials that are
-    kept move both sides alike (squats), and show nothing of one.
-    """
+    """Return a finding's gain against sides alike, by halves: trials that are kept move both sides alike."""
     alike, rest = tables_by_sides(before)[0][0], inferred.without(index)
     try:
         return _gain(
@@ -384,17 +367,13 @@ def _without(result: SessionResult, inferred: Inferred, index: int) -> _Correcte
 
 
 def _acts(result: SessionResult, one: NamedCause) -> bool:
-    """Return whether a cause does anything in the data by which its gain is judged: a touch that came and went before
-    has nothing to gain there, and nothing to lose.
-    """
+    """Return whether a cause does anything in the data that judge its gain: a touch that is over does nothing there."""
     judged = windows(result.trials, KEPT_ROLES) or windows(result.trials, FITTED_ROLES)
     return not one.course or any(window.trial.name in one.course for window in judged)
 
 
 def _gain(before: _Corrected | None, after: _Corrected) -> Gain | None:
-    """Return what the second gains against the first on the data not used; None where these are too few, or the same
-    is left of them.
-    """
+    """Return what the second gains on the data not used; None where these are too few, or the same is left of them."""
     if before is None or before.kept is None or after.kept is None or before.used is None or after.used is None:
         return None
     if all(np.allclose(a, b, rtol=0, atol=_SAME) for a, b in zip(before.kept.left, after.kept.left, strict=True)):
@@ -435,9 +414,8 @@ def _mended(result: SessionResult, roles: tuple[Role, ...], mend: _Mend, phi: Ar
 
 
 def _by_halves(body: Body, fits: _Fits, about: Array, prior: Sip | None) -> tuple[Residuals | None, Residuals | None]:
-    """Return what the body that each half of the movement gives leaves of that half, and of the other one; nothing
-    where a half gives none.
-    """
+    """Return what the body of each half of the movement leaves of that half, and of the other; None for nothing."""
+    # frames in use are counted through all trials: those up to half of their number are the first half
     first = np.cumsum(np.concatenate([fit.use for fit in fits]))
     early = np.split(2 * first <= first[-1], np.cumsum([fit.use.size for fit in fits])[:-1])
     parts = [

@@ -1,7 +1,4 @@
-"""What a person must see first: the headline, one sentence of at most `WORDS` words, and one thing to do; then
-everything refused, not solved or outside its limit, strongest first; what a session ends with beside all of that. Page,
-terminal and JSON show the same records.
-"""
+"""What a person must see: a headline of at most `WORDS` words, then all that is open, the strongest first."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -18,7 +15,16 @@ from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, Step, TrialResult
-from biodance.pipeline.words import LOAD, alternatives, cause_of, explained, names_markers, reason_notes, spoken
+from biodance.pipeline.words import (
+    LOAD,
+    alternatives,
+    cause_of,
+    explained,
+    first_upper,
+    names_markers,
+    reason_notes,
+    spoken,
+)
 from biodance.records.attention import (
     LEVELS,
     LIMIT_TOLD,
@@ -57,9 +63,7 @@ _WHY: dict[Reason, tuple[str, str]] = {
 def headline(
     one: Diagnosis, judged: Sequence[Judged], static: frozenset[str], others: Sequence[Attention] = ()
 ) -> Attention:
-    """Return what a session ends with in one sentence and one thing to do; ``static`` are its static trials,
-    ``others`` what else a person must see of it: no sentence is weaker than they are.
-    """
+    """Return what a session ends with, no weaker than the ``others`` to be seen; ``static`` its static trials."""
     missed = [row.trial for row in judged if row.missed and not row.seconds > 0 and row.trial not in static]
     own: Level = "fail"
     if one.status is DiagnosisStatus.NAMED:
@@ -72,26 +76,27 @@ def headline(
         own = "warn" if missed else "note"
         well = all(other.level == "note" for other in others)
         sentences = _clean(amount(judged, static), missed, well=well)
+    # sentences come ever shorter: the first that is short enough says most
     text = next(text for text in sentences if len(text.split()) <= WORDS)
     return Attention(min((own, *(other.level for other in others)), key=LEVELS.index), text, about=ABOUT)
 
 
 def amount(judged: Sequence[Judged], static: frozenset[str]) -> str:
-    """Return what was judged in words: ``3 s of standing and 12 s of movement``, or of steps where the witnesses alone
-    judged them; "" for nothing.
-    """
+    """Return what was judged in words: ``3 s of standing and 12 s of movement``, or of steps; "" for nothing."""
     totals: dict[str, float] = {}
     for row in judged:
         what = "standing" if row.trial in static else "steps" if row.missed else "movement"
         totals[what] = totals.get(what, 0.0) + row.seconds
-    parts = [f"{digits(s, 2)} s of {what}" for what, s in totals.items() if s > 0]
-    return " and ".join(filter(None, (", ".join(parts[:-1]), *parts[-1:])))
+    return _joined([f"{digits(s, 2)} s of {what}" for what, s in totals.items() if s > 0], "and")
+
+
+def _joined(names: Sequence[str], last: str) -> str:
+    """Return names as a list in words, with "and" or "or" before the last."""
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def _clean(seen: str, missed: Sequence[str], *, well: bool) -> Iterator[str]:
-    """Yield that nothing is wrong in what was ``seen``, and what was ``missed`` or needs somebody all the same, ever
-    shorter.
-    """
+    """Yield that nothing is wrong in what was ``seen``, what was ``missed`` and what needs somebody, ever shorter."""
     again = f'Record {"it" if len(missed) == 1 else "them"} again, or set role = "skip".'
     for found in (f"Nothing wrong was found in {seen}", "Nothing wrong was found"):
         if missed:
@@ -112,21 +117,14 @@ def _named(one: Diagnosis) -> Iterator[str]:
     start = "" if more == 1 else f"{more} things are wrong. First, "
     also = alternatives(first)
     rest = ", and more is wrong" if not {Reason.FORCES_LEFT, Reason.UNUSUAL_BODY}.isdisjoint(one.why) else ""
-    several = (_either(also), f"{also[0]} or something else", "something else") if also else ()
+    # with every alternative by name, with one, with none
+    several = (_joined(also, "or"), f"{also[0]} or something else", "something else") if also else ()
     sets = [f", or it is {some}" for some in several] or [""]
     for fact in (told.fact, told.plain):
         for alike in sets:
-            yield _sentence(f"{start}{fact}{alike}{rest}. {told.do}")
-    yield _sentence(f"{start}{told.plain}{sets[-1]}. {told.do}")
-    yield _sentence(f"{len(one.faults)} things are wrong, the first: {spaced(first.effect)}. {_MEND}")
-
-
-def _either(names: Sequence[str]) -> str:
-    return " or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}"
+            yield first_upper(f"{start}{fact}{alike}{rest}. {told.do}")
+    yield first_upper(f"{start}{told.plain}{sets[-1]}. {told.do}")
+    yield f"{len(one.faults)} things are wrong, the first: {spaced(first.effect)}. {_MEND}"
 
 
 def _unknown(one: Diagnosis) -> Iterator[str]:
@@ -150,7 +148,7 @@ def _cannot_tell(one: Diagnosis, seen: str) -> Iterator[str]:
     if reason is Reason.BODY_DOUBTFUL and len(about) == 1:
         yield f"{_UNTOLD}: {about[0]}. Mend it, and run this again."
     if reason is Reason.UNDESCRIBED_JOINTS and about:
-        yield f"{_UNTOLD}: what is usual of {_either(about)} is not known yet. {do}"
+        yield f"{_UNTOLD}: what is usual of {_joined(about, 'or')} is not known yet. {do}"
     if reason is Reason.NOT_COMPARED and seen:
         yield f"{_UNTOLD}: no movement stayed on the plates for {SHORTEST_RUN:g} s. {_SQUATS}"
     yield f"{_UNTOLD}: {why}. {do}"
@@ -177,8 +175,11 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     """
     judged = stepped(judged, one.witnesses)
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
-    if one.faults:
-        one = replace(one, explained=one.explained and not _more_is_wrong(one, result, judged, outside))
+    if one.faults:  # is anything open beside them: a check, a doubt of the body that no finding concerns, a trial?
+        found = {finding.target for finding in one.findings}
+        doubts = any(not doubt.mended and found.isdisjoint(doubt.about) for doubt in result.doubts)
+        more = outside or doubts or any(row.missed for row in judged)
+        one = replace(one, explained=one.explained and not more)
     else:
         one = _without_faults(one, result, judged, outside)
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
@@ -187,23 +188,15 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     return replace(one, attention=(first, *others))
 
 
-def _more_is_wrong(
-    one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...], outside: tuple[Check, ...]
-) -> bool:
-    """Return whether something is open beside the causes that are named: a check, a doubt of the body that no finding
-    concerns, a trial that nobody judged.
-    """
-    found = {finding.target for finding in one.findings}
-    doubts = [doubt for doubt in result.doubts if not doubt.mended and found.isdisjoint(doubt.about)]
-    return bool(outside or doubts or any(row.missed for row in judged))
-
-
 def _without_faults(
     one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...], outside: tuple[Check, ...]
 ) -> Diagnosis:
     """Return a diagnosis that names no fault with whether nothing is wrong, or why nobody can tell."""
     if not (one.explained or one.adequacy):
-        well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
+        # Feet and clocks judged steps that were compared with the body, too, if for less than the engine needs.
+        compared = {one.name for one in result.trials if one.comparison is not None and one.comparison.used.any()}
+        steps = any(row.seconds > 0 for row in judged if row.trial in compared - static_trials(result))
+        well = not (one.why or one.resembles) and steps
         one = replace(one, explained=well, why={**one.why, Reason.NOT_COMPARED: ()})
     if one.explained and (against := _not_clean(result, judged, outside)):
         one = replace(one, explained=False, why={**against, **one.why})
@@ -214,14 +207,6 @@ def _without_faults(
     if any(step.name == "subject" and step.status != "done" for step in result.steps):
         one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
     return one
-
-
-def _compared_by_steps(result: SessionResult, judged: tuple[Judged, ...]) -> bool:
-    """Return whether feet and clocks judged steps in which the forces were compared with the body, too, if for less
-    than the engine needs: nothing is wrong there if they say so and no limit is broken.
-    """
-    compared = {one.name for one in result.trials if one.comparison is not None and one.comparison.used.any()}
-    return any(row.seconds > 0 for row in judged if row.trial in compared - static_trials(result))
 
 
 def _not_clean(
@@ -255,9 +240,7 @@ def is_well(one: Diagnosis) -> bool:
 
 
 def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
-    """Return every file refused, step refused, fit that failed, load found, warning, and check outside its limit; a
-    check that a finding may explain points to it. Nobody has to stand on a plate in the static trial.
-    """
+    """Return every refusal, failed fit, load, warning, and check outside its limit, which points to its cause."""
     found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
     found += [Attention(_level(step), step.text, "", step.name) for step in result.steps if step.status != "done"]
     found += [Attention("note", NOT_WEIGHED, "", "weighing")] if result.weighed is None else []
@@ -268,7 +251,8 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [Attention(one.level, one.said, "", about) for about, said in warned.items() for one in said]
     found += [Attention("note", text, "", "subject") for text in result.unused]
     found += [line for trial in result.trials for line in _of_trial(trial, findings)]
-    told = not cause_of(CheckKind.WEIGHT, findings) and any(_weighed(trial) for trial in result.trials)
+    # a reader said of the weight what its check would say again, unless that points to a cause
+    told = not cause_of(CheckKind.WEIGHT, findings) and any(map(_weighed, result.trials))
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
     found += [_habit(one) for one in findings if one.cause.habit]
@@ -276,9 +260,7 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
 
 
 def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
-    """Return what was taken off the recordings before the body was fitted, or left open in it, one sentence each: the
-    laboratory's next recording will have it again. A note where it is no fault, so that nobody has to do anything.
-    """
+    """Return what was taken off the recordings before the fit, or left open in it; a note where it is no fault."""
     found = result.identification.corrected if result.identification else ()
     return tuple(
         Attention(
@@ -292,16 +274,17 @@ def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
     )
 
 
+def _weighed(trial: TrialResult) -> bool:
+    return any(isinstance(text, WrongWeight) for text in trial.reasons)
+
+
 def _habit(one: Finding) -> Attention:
-    """Return what a laboratory does otherwise than is expected, and what it cannot be told from."""
-    text = " or ".join([spoken(one).fact, *(f"it is {other}" for other in alternatives(one))]) + f". {one.advice}"
-    return Attention("warn" if len(one.set) > 1 else "note", f"{text[:1].upper()}{text[1:]}", about=one.effect)
+    text = " or ".join([spoken(one).fact, *(f"it is {other}" for other in alternatives(one))])
+    return Attention("warn" if len(one.set) > 1 else "note", first_upper(f"{text}. {one.advice}"), about=one.effect)
 
 
 def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention]:
-    """Return the refusals and warnings of a trial. A static trial is not compared with the plates: that it stands
-    beside them is a note.
-    """
+    """Return the refusals and warnings of a trial; that a static trial stands beside the plates is a note."""
     level: Level = "fail" if trial.status == "refused" else "warn"
     if trial.trial.role == "static" and not trial.trial.warnings:
         level = "note" if all(step.status == "done" or step.name in _ON_PLATES for step in trial.steps) else level
@@ -310,15 +293,8 @@ def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention
     return [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
 
 
-def _weighed(trial: TrialResult) -> bool:
-    """Return whether a reader said of a trial that its weight is not the declared one."""
-    return any(isinstance(text, WrongWeight) for text in trial.reasons)
-
-
 def identified_attention(result: SessionResult, checks: Sequence[QualityCheck]) -> tuple[Attention, ...]:
-    """Return what a person must see of a session that was identified and not diagnosed: the ``checks`` of its
-    recordings that failed (units, signs, labels, clocks) stand first, as the diagnosis says them.
-    """
+    """Return what must be seen of a session not diagnosed: the ``checks`` that failed stand first."""
     findings = tuple(failed_check(quality) for quality in checks)
     if not findings:
         return session_attention(result)
@@ -331,8 +307,13 @@ def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
     cause = cause_of(check.what, findings)
     then = explained(cause) if cause else check.advice
-    text = f"{check.value}{LIMIT_TOLD}{check.limit}. {then[:1].upper()}{then[1:]}".strip()
+    text = f"{check.value}{LIMIT_TOLD}{check.limit}. {first_upper(then)}".strip()
     return Attention("note" if cause or check.what in _NOTED else "warn", text, check.where, check.what)
+
+
+def _level(step: Step) -> Level:
+    """Return how loudly a step that was not done is said: a session too short to identify from needs nobody."""
+    return "warn" if step.status != "refused" else "note" if step.name == "identify" else "fail"
 
 
 def _load(result: SessionResult, findings: Sequence[Finding]) -> list[Attention]:
@@ -344,17 +325,8 @@ def _load(result: SessionResult, findings: Sequence[Finding]) -> list[Attention]
     return [Attention("warn", text, about=LOAD)]
 
 
-def _level(step: Step) -> Level:
-    """Return how loudly a step that was not done is said: a session too short to identify from needs nobody."""
-    if step.status == "refused":
-        return "note" if step.name == "identify" else "fail"
-    return "warn"
-
-
 def stepped(rows: tuple[Judged, ...], evidence: ObservedEvidence | None) -> tuple[Judged, ...]:
-    """Return what a verdict rests on with the steps that only the witnesses could judge: seconds of one foot alone on
-    a plate. Such a trial still misses the comparison with a body.
-    """
+    """Return the rows with the seconds of one foot alone on a plate that only the witnesses could judge."""
     alone = evidence.seconds if evidence else {}
     return tuple(
         replace(row, seconds=alone[row.trial], why_not=f"only by its steps: {row.why_not}")

@@ -1,9 +1,7 @@
-"""Who moves in this session: the body scaled on a static trial, its joints placed by the movement, else from stature
-alone; and the joints beyond its 23 axes that its markers show. How it came about is said. Whether an earlier body or
-session is of the same person, weight and length of the legs answer.
-"""
+"""Who moves: the body scaled by a static trial or stature, its joints, and whether an earlier body is the same's."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -71,9 +69,7 @@ def _placed(
 def _without_static(
     subject: Subject, read: tuple[TrialResult, ...], settings: Settings, steps: list[Step], *, had_static: bool
 ) -> tuple[Body | None, str]:
-    """Return the better of two bodies: from stature alone, or scaled on one frame of a moving trial with both feet on
-    the ground; better is the one whose markers lie nearer in that trial.
-    """
+    """Return the body from stature, or scaled on a moving frame: whose markers lie nearer in that trial."""
     worn = [one.trial for one in read if one.usable and one.trial.markers is not None and one.trial.marker_set]
     if all(one.trial.markers is None for one in read):
         steps.append(Step("scale", "refused", _NO_MARKERS))
@@ -97,24 +93,19 @@ def _without_static(
             break
     if not choices:
         return None, "No body."
-    body, said, done = min(choices, key=lambda choice: _distance(choice[0], worn[0]))
+
+    def distance(choice: tuple[Body, str, list[Step]]) -> float:  # RMS, m
+        motion = attempt([], "track", partial(track, choice[0], worn[0]))
+        return float(np.sqrt(np.nanmean(motion.residual**2))) if motion is not None else math.inf
+
+    body, said, done = min(choices, key=distance)
     steps += done
     return body, said
 
 
-def _distance(body: Body, trial: Trial) -> float:
-    """Return the RMS distance (m) of the trial's markers from a body that follows them; infinite if it cannot."""
-    motion = attempt([], "track", partial(track, body, trial))
-    return float(np.sqrt(np.nanmean(motion.residual**2))) if motion is not None else math.inf
-
-
 def calibrate_joints(scaling: Scaling, read: tuple[TrialResult, ...]) -> Scaling:
-    """Return the scaling with the joints that the trials with role fit show at the places where these show them.
-
-    Raises
-    ------
-    TrialRefused
-        No trial with role fit has markers of the same set.
+    """Return the scaling with the joints that the trials with role fit show at the places where these show them. Raises
+    TrialRefused: no trial with role fit has markers of the same set.
     """
     wanted = scaling.posture.marker_set.name
     fits = [one.trial for one in read if one.usable and one.trial.role == "fit" and one.trial.marker_set == wanted]
@@ -128,9 +119,7 @@ def calibrate_joints(scaling: Scaling, read: tuple[TrialResult, ...]) -> Scaling
 
 
 def _carried_by_plates(trial: Trial, mass: float) -> Markers | None:
-    """Return the markers of a trial, hidden while a chair or a rail carries a part of the ``mass`` kg: it pushes skin
-    aside and bends the trunk as no joint does.
-    """
+    """Return a trial's markers, hidden while a chair carries: it pushes skin aside and bends the trunk."""
     if trial.markers is None or not trial.plates:
         return trial.markers
     xyz = np.array(trial.markers.xyz)
@@ -170,18 +159,11 @@ _WORDS = {
 
 
 def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -> tuple[Body, ShownJoints]:
-    """Return the body with the joints that the markers of its moving trials show, and what each brings; as it is where
-    no static trial placed its markers, or nothing moves.
-    """
-    statics = [one.trial for one in read if one.usable and one.trial.role == "static"]
-    worn = (
-        statics[0].marker_set
-        if statics and any(step.name == "scale" and step.status == "done" for step in steps)
-        else ""
-    )
-    moving = [
-        one.trial.markers for one in read if one.usable and one.trial.role != "static" and one.trial.marker_set == worn
-    ]
+    """Return the body with the joints that moving trials show; as it is where no static trial placed markers."""
+    usable = [one.trial for one in read if one.usable]
+    scaled = any(step.name == "scale" and step.status == "done" for step in steps)
+    worn = next((trial.marker_set for trial in usable if trial.role == "static"), "") if scaled else ""
+    moving = [trial.markers for trial in usable if trial.role != "static" and trial.marker_set == worn]
     recorded = tuple(markers for markers in moving if markers is not None)
     if not worn or not recorded:
         return body, ShownJoints()
@@ -194,24 +176,20 @@ def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -
 
 
 def with_forces(shown: ShownJoints, plain: Body, body: Body, done: tuple[TrialResult, ...]) -> tuple[Body, ShownJoints]:
-    """Return the body and its joints with what these bring to the vertical force of every trial that was compared,
-    against the ``plain`` body without them.
-    """
+    """Return body and joints with what these bring to the forces of every trial, against the ``plain`` body."""
     if not shown.taken:
         return body, shown
-    forces = tuple(gain for one in done for gain in _force_gain(plain, one))
-    return replace(body, notes=(*body.notes, *_of_forces(forces))), replace(shown, forces=forces)
-
-
-def _force_gain(plain: Body, one: TrialResult) -> list[ForceGain]:
-    compared = one.comparison
-    if compared is None or one.trial.role == "static" or not compared.used.any():
-        return []
-    motion = attempt([], "track", partial(track, plain, one.trial))
-    if motion is None:
-        return []
-    left = (compared.measured - predict_wrench(plain, motion).value)[compared.used, :3]
-    return [ForceGain(one.name, tuple(np.sqrt(np.mean(left**2, axis=0)).tolist()), tuple(compared.rms[:3].tolist()))]
+    forces = []
+    for one in done:
+        compared = one.comparison
+        if compared is None or one.trial.role == "static" or not compared.used.any():
+            continue
+        motion = attempt([], "track", partial(track, plain, one.trial))
+        if motion is not None:
+            left = (compared.measured - predict_wrench(plain, motion).value)[compared.used, :3]
+            without = tuple(np.sqrt(np.mean(left**2, axis=0)).tolist())
+            forces.append(ForceGain(one.name, without, tuple(compared.rms[:3].tolist())))
+    return replace(body, notes=(*body.notes, *_of_forces(forces))), replace(shown, forces=tuple(forces))
 
 
 def _sentence(gain: JointGain) -> str:
@@ -222,10 +200,11 @@ def _sentence(gain: JointGain) -> str:
     return f"{start}; {held}. {end}."
 
 
-def _of_forces(forces: tuple[ForceGain, ...]) -> tuple[str, ...]:
+def _of_forces(forces: Sequence[ForceGain]) -> tuple[str, ...]:
     """Return in one sentence what the joints bring to the forces: horizontal, and vertical."""
     if not forces:
         return ()
+    # (trials, 3) N RMS by axis; over the axes squares add up, over the trials their mean counts
     without, with_them = (np.array([getattr(one, name) for one in forces]) for name in ("without", "with_them"))
     told = []
     for name, axes in (("horizontal", slice(0, 2)), ("vertical", slice(2, 3))):
@@ -294,6 +273,7 @@ def _unlike_legs(known: Body, body: Body) -> str:
 
 def _leg(body: Body) -> float:
     """Return the length (m) from hip to knee to ankle, mean of both sides; 0 where a leg has neither."""
+    # a joint's place in its parent: of the knee the length of the thigh, of the ankle that of the shank
     length = {joint.name: float(np.linalg.norm(joint.translation)) for joint in body.joints}
     ends = [f"{side}_{joint}" for side in SIDES for joint in ("knee_flexion", "ankle_dorsiflexion")]
     return sum(length[end] for end in ends) / len(SIDES) if all(end in length for end in ends) else 0.0

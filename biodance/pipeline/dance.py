@@ -1,11 +1,10 @@
-"""A dance for one person or robot, from what is known of it to the numbers of the finished dance, all steps in order;
-and what came of it: the dance, its margins, what it tells, and the sentences that stand before it.
-"""
+"""A dance for a person or robot, step by step, with its margins, what it tells, and what others see of it."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,9 @@ from biodance.dance.search.word_course import NoNextPosture, freer_dance
 from biodance.dance.verify import DanceMetrics, Margin, broken, dance_metrics, longest_alone
 from biodance.display import cause_in_words
 from biodance.errors import BiodanceError
-from biodance.records import Session, Subject
+from biodance.lab.c3d.write import FileValue
+from biodance.motion.kinematics import poses
+from biodance.records import SIDES, Array, Markers, Motion, Session, Subject
 from biodance.threads import one_thread
 
 if TYPE_CHECKING:
@@ -120,28 +121,22 @@ class DanceResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What must be known of this dance, in plain sentences: what is not safe, and what it cannot tell because the
-        criterion is far from its bound.
-        """
+        """What is not safe in this dance, and what it cannot tell, as its criterion is far from its bound."""
         unsafe = not_safe(self.dance) if self.dance else ()
         if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
             return unsafe
         ratio = self.account.static / self.account.static_bound
         hardly = f" Hardly tilted: {_names(self.account.hardly)}." if self.account.hardly else ""
-        return (
-            *unsafe,
-            f"The static criterion is {ratio:.1f} times its bound.{hardly} {self._unlearned(self.expectation)}",
+        known, poor = self.expectation, []  # what stays nearly as uncertain as in the table
+        for what, sd in (("mass", known.mass), ("centre of mass", known.com)):
+            names = [name for name, left in zip(known.segments, sd[-1] / sd[0], strict=True) if left > _NEW]
+            poor += [f"the {what} of {_names(names)}"] * bool(names)
+        taught = (
+            f"It cannot teach {' and '.join(poor)}: the table alone tells."
+            if poor
+            else "Every segment is learned in part."
         )
-
-    def _unlearned(self, known: Expectation) -> str:
-        """Return what is not learned, in a sentence: what stays nearly as uncertain as in the table."""
-        told = {"mass": known.mass, "centre of mass": known.com}
-        poor = {
-            what: tuple(name for name, ratio in zip(known.segments, sd[-1] / sd[0], strict=True) if ratio > _NEW)
-            for what, sd in told.items()
-        }
-        said = " and ".join(f"the {what} of {_names(names)}" for what, names in poor.items() if names)
-        return f"It cannot teach {said}: the table alone tells." if said else "Every segment is learned in part."
+        return (*unsafe, f"The static criterion is {ratio:.1f} times its bound.{hardly} {taught}")
 
     @property
     def price(self) -> str:
@@ -159,9 +154,7 @@ class DanceResult:
 
     @property
     def emphasis(self) -> tuple[str, ...]:
-        """What came of the emphasis on segments, a sentence each: how well its mass will be known, how well that of its
-        counterpart, and why both where one was asked for.
-        """
+        """How well masses become known of segments with an emphasis and of their counterparts, in sentences."""
         known, out = self.expectation, list[str]()
         for name, factor in self.plan.weights if known is not None else ():
             if known is None or factor <= self.plan.other_weight or counterpart(name) == name:
@@ -172,9 +165,10 @@ class DanceResult:
                 f"Emphasis on the {_names((name,))}: its mass becomes known to {after[here]:.2f} kg (table: "
                 f"{before[here]:.2f}), that of the {_names((counterpart(name),))} to {after[there]:.2f}."
             )
-            covariance = self.body.sip.covariance
+            covariance = self.body.sip.covariance  # of [m, mc, I] by segment: every tenth row is a mass
             i, j = 10 * here, 10 * there
             alike = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+            # left of the table's sd on the other side, too: the emphasis taught both through their correlation
             if after[there] / before[there] < _AS_MUCH * after[here] / before[here]:
                 said += f" Both, because a person's sides are alike (correlation in the table {alike:.2f})."
             out.append(said)
@@ -187,9 +181,7 @@ class DanceResult:
 
     @property
     def complete(self) -> bool:
-        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible,
-        and imprecise people are safe.
-        """
+        """True where nothing of the protocol was left out, and imprecise people are safe."""
         counted = self.dance.counted.sum() if self.dance else 0
         return (
             not self.notes
@@ -199,9 +191,7 @@ class DanceResult:
 
 
 def before_cues(result: DanceResult, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
-    """Return what stands before the cues, in the language that ``say`` and ``number`` speak: for whom, the reason
-    of the person's own limits, how safe.
-    """
+    """Return what stands before the cues in the language of ``say``: for whom, whose limits, how safe."""
     out = [say("For %(whom)s.", whom=say(result.plan.whom))] if result.plan.whom else []
     if result.dance and (alone := longest_alone(result.dance)):
         out.append(say("One foot is off the ground for up to %(seconds)s s at a time.", seconds=number(alone, 0)))
@@ -226,8 +216,8 @@ def before_cues(result: DanceResult, say: Say = in_english, number: Number = as_
     return tuple(out)
 
 
-def _names(segments: tuple[str, ...]) -> str:
-    return ", ".join(display.spaced(name) for name in segments)
+def _names(segments: Iterable[str]) -> str:
+    return ", ".join(map(display.spaced, segments))
 
 
 def not_safe(dance: Dance) -> tuple[str, ...]:
@@ -244,29 +234,24 @@ def not_safe(dance: Dance) -> tuple[str, ...]:
 def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_number) -> str:
     """Return how much force plate a dance needs, and for which it was made, in the language of ``say``."""
     wide, ahead = (number(one, 2) for one in room_on_plates(dance.stances))
-    around = number(100 * AROUND, 1)
+    room = {"wide": wide, "ahead": ahead, "around": number(100 * AROUND, 1)}
     if any(stance.seat for stance in dance.stances):
         said = say(
             "The stool's legs need %(wide)s m of force plate from side to side and %(ahead)s m ahead; mark their "
             "outlines.",
-            wide=wide,
-            ahead=ahead,
+            **room,
         )
     elif any(np.isfinite(stance.hands).any() for stance in dance.stances):
         said = say(
             "The feet need %(wide)s m of force plate from side to side and %(ahead)s m ahead, %(around)s cm around "
             "them included, and the legs of the frame stand on plates, too; mark their outlines.",
-            wide=wide,
-            ahead=ahead,
-            around=around,
+            **room,
         )
     else:
         said = say(
             "The feet need %(wide)s m of force plate from side to side and %(ahead)s m ahead, %(around)s cm around "
             "them included; mark their outlines.",
-            wide=wide,
-            ahead=ahead,
-            around=around,
+            **room,
         )
     if dance.plate is None:
         return said
@@ -280,9 +265,7 @@ _ALIKE = 0.001
 
 
 def plates_too_small(dance: Dance, session: Session) -> str:
-    """Return a sentence where the plates of a ``session`` cannot carry all feet of a ``dance``, whichever way the
-    person faces; "" where they can: several are taken for as large as what they enclose.
-    """
+    """Return a sentence where a session's plates together cannot carry all feet of a dance; else ""."""
     fits = [trial for trial in session if trial.role == "fit"]
     corners = [plate.corners[:, :2] for trial in fits for plate in trial.plates if plate.placed]
     if not corners:
@@ -307,12 +290,7 @@ TRIAL_SECONDS = 20.0
 
 def foresee_dance(path: Path) -> tuple["Foresight", Dance, Expectation | None]:
     """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, the
-    dance, and what it teaches of a person's masses (None of a robot's).
-
-    Raises
-    ------
-    FileRefused
-        The file is no dance.
+    dance, and what it teaches of a person's masses (None of a robot's). Raises FileRefused: the file is no dance.
     """
     from biodance.diagnosis.foresight import foresee, session_of
 
@@ -337,12 +315,7 @@ _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 def dancer(subject: Subject, plan: Plan) -> Body:
     """Return the body of a person for whom a dance is designed: a generic one, joints within the ranges that the plan
-    names.
-
-    Raises
-    ------
-    BiodanceError
-        Mass or stature are outside the range of the tables.
+    names. Raises BiodanceError: mass or stature are outside the range of the tables.
     """
     for name, (low, high, unit) in _LEGAL.items():
         value = getattr(subject, name)
@@ -378,7 +351,10 @@ def make_dance(
     started, robot = time.perf_counter(), subject is None
     plan = robot_plan(body, plan) if robot else plan
     own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
-    notes = (*(_robot_notes(body) if robot else ()), *notes)
+    if robot:
+        coarse = pairs_of(body).unchecked
+        boxes = f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}."
+        notes = (*body.notes, *([boxes] if coarse else []), *notes)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
         dance, margins = (design_robot if robot else design)(own, plan, seed=seed, tell=tell, resume=resume)
@@ -389,6 +365,7 @@ def make_dance(
         rest = plan.rest if np.isfinite(plan.rest) else None
         dance = replace(dance, plate=plan.plate, subject=subject, care=plan.care, rest=rest)
         tell("counting what the dance tells", 0, 0)
+        # minutes of work that share nothing: two of the three counts run beside, in a process of their own
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
             free = aside.submit(_freer_expectation, dance, plan)
@@ -404,17 +381,8 @@ def make_dance(
     return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
 
 
-def _robot_notes(body: Body) -> tuple[str, ...]:
-    """Return what was made of a robot's file, and which of its parts are not kept apart, in sentences."""
-    coarse = pairs_of(body).unchecked
-    words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
-    return (*body.notes, *words)
-
-
 def _freer_expectation(dance: Dance, plan: Plan) -> Expectation | None:
-    """Return what as many postures chosen freely on the same feet would tell; None where the plan leaves the choice
-    free, or there are not as many.
-    """
+    """Return what as many postures on the same feet would tell, chosen freely; None where they are."""
     if not np.isfinite(plan.instructions):
         return None
     try:
@@ -465,3 +433,53 @@ def named_feet(feet: str) -> tuple[str, str]:
     if len(names) != 2 or names[0] == names[1] or not all(names):
         raise BiodanceError(f"--feet {feet}: expected the links of the right and the left foot, separated by a comma.")
     return names[0], names[1]
+
+
+PREVIEW_RATE = 100.0
+"""Hz of the preview's markers and of the table of joint angles."""
+
+
+def held_postures(dance: Dance, chosen: Sequence[int] | None = None) -> Motion:
+    """Return the postures of a dance (all, or those ``chosen`` by index) as a motion of one frame each, at rest."""
+    numbers = range(len(dance.stances)) if chosen is None else chosen
+    both = ((dance.postures[p], dance.stances[p]) for p in numbers)
+    x = np.array([dance.chain.plant(row[None], stance.planted, stance.ankle)[0] for row, stance in both])
+    return dance.chain.motion(np.arange(len(x), dtype=float), x, np.zeros_like(x), np.zeros_like(x))
+
+
+def preview_markers(dance: Dance) -> Markers:
+    """Return the dance as virtual markers at `PREVIEW_RATE`: what cameras see of a person who dances it exactly."""
+    motion, markers = dance.motion(PREVIEW_RATE), dance.body.markers
+    xyz = poses(dance.body, motion.q).points(list(markers.segment), markers.position)
+    return Markers(markers.names, motion.time, xyz)
+
+
+def preview_parameters(dance: Dance) -> dict[str, dict[str, FileValue]]:
+    """Return what a C3D file says beside the markers: the mass (kg), events (postures by their number, feet that leave
+    the ground or come back; times in minutes and seconds) and support phases (times in s).
+    """
+    found = [(phase.start, "General", f"Posture {phase.posture + 1}") for phase in dance.phases if phase.kind == "hold"]
+    for before, after in pairwise(dance.phases):
+        for side, name in enumerate(SIDES):
+            down = [side in phase.stance.planted for phase in (before, after)]
+            if down[0] != down[1]:
+                found.append((after.start, name.capitalize(), "Foot Strike" if down[1] else "Foot Off"))
+    time = np.array([one[0] for one in sorted(found)])
+    contexts, labels = ([one[k] for one in sorted(found)] for k in (1, 2))
+    # C3D: times of events are pairs of whole minutes and seconds
+    minutes = np.stack([time // 60, time % 60])
+    feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "stool" for phase in dance.phases]
+    times = np.array([[phase.start, phase.end] for phase in dance.phases]).T
+    return {
+        "PROCESSING": {"Bodymass": float(dance.body.sip.mass.sum())},
+        "SUBJECTS": {"NAMES": ["designed dance"]},
+        "EVENT": {"USED": np.int16(len(found)), "CONTEXTS": contexts, "LABELS": labels, "TIMES": minutes},
+        "DANCE": {"SUPPORT": feet, "SUPPORT_TIMES": times},
+    }
+
+
+def setpoints(dance: Dance) -> tuple[list[str], Array]:
+    """Return headings and rows of a robot's dance: time (s), root (m, quaternion x y z w), angles (rad), z up."""
+    motion = dance.motion(PREVIEW_RATE)
+    names = ["time_s", *(f"root_{axis}_m" for axis in "xyz"), *(f"root_q{axis}" for axis in "xyzw")]
+    return [*names, *(f"{joint.name}_rad" for joint in dance.body.joints)], np.column_stack([motion.time, motion.q])

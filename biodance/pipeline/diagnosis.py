@@ -1,12 +1,9 @@
-"""What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body
-and gains elsewhere.
-"""
+"""What the simulation of a session gets wrong: checks, causes, one load, and what accepting them gains elsewhere."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import SessionTolerances, own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
@@ -14,28 +11,118 @@ from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.discovery import Chosen
-from biodance.effects import Cause, DiscreteEffect, Effect, Recorded, causes, check_quality
+from biodance.effects import Cause, CheckKind, DiscreteEffect, Effect, Recorded, causes, check_quality
+from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.unloaded_body import expect_unloaded
-from biodance.inference.decision import Inferred
+from biodance.inference.decision import UNPLACED_LOAD
 from biodance.inference.session import judge, see
 from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections, with_right_labels
 from biodance.pipeline.attention import reconcile_with_checks
-from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
+from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification, load_doubts
 from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out, recorded_of
-from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.session import identified
+from biodance.pipeline.words import LOAD, cause_of, explained
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
-if TYPE_CHECKING:
-    pass
+
+def as_diagnosed(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
+    """Return the session with what the ``diagnosis`` says of its load: told where it may be, else why not."""
+    return with_causes_of_doubt(with_weighed_load(result, diagnosis), diagnosis)
+
+
+def with_weighed_load(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
+    """Return the session with its load told where nothing but its own weight spoke against it and it is more probable
+    than none: a weight other than declared is a doubt about a load until the ``diagnosis`` names a load, alone or among
+    causes that it cannot tell apart.
+    """
+    found = result.identification
+    if found is None or not any(alias.effect == LOAD for one in diagnosis.findings for alias in one.set):
+        return result
+    plain, weighed = (set(load_doubts(result.all_checks, weighed=one)) for one in (False, True))
+    search = replace(found.search, doubts=tuple(one for one in found.search.doubts if one not in plain - weighed))
+    return replace(result, identification=replace(found, search=search)) if _likely(search) else result
+
+
+def with_causes_of_doubt(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
+    """Return the session whose doubt about a load points to the cause found in place of its advice."""
+    found, causes = result.identification, [one for one in diagnosis.findings if one.effect != LOAD]
+    if found is None or not found.search.doubts or not causes:
+        return result
+    pointed = {}
+    for check in result.all_checks:
+        for doubt in load_doubts([check], weighed=False):
+            cause = cause_of(check.what, causes)
+            pointed[doubt] = f"{doubt.removesuffix(check.advice)}{explained(cause)}" if cause else doubt
+    doubts = tuple(pointed.get(doubt, doubt) for doubt in found.search.doubts)
+    return replace(result, identification=replace(found, search=replace(found.search, doubts=doubts)))
+
+
+def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:
+    """Return the diagnosis with the load that was found (`LoadSearch`) in place of its own, before a cause that cannot
+    be told from it, as an alternative to one of the same weight, or beside what has another reason; where only its
+    weight was named (`UNPLACED_LOAD`), on the segments that may carry it, as soon as it is more probable than none.
+    """
+    if search is None:
+        return one
+    heavy = next((finding for finding in one.findings if any(alias.effect == LOAD for alias in finding.set)), None)
+    mine = [finding for finding in one.findings if finding.effect == LOAD]
+    if heavy is not None and not mine:
+        return _with(one, heavy, _placed(heavy, search))
+    if not search.found or len(mine) > 1:  # the search knows one load only
+        return one
+    load = _finding(search, mine[0] if mine else None)
+    if mine:
+        return _with(one, mine[0], load)
+    alike = next((finding for finding in one.findings if CheckKind.WEIGHT in finding.cause.explains), None)
+    if alike is not None:
+        return _with(one, alike, replace(alike, set=(*alike.set, *load.set)))
+    return replace(one, findings=(*one.findings, load))
+
+
+def _with(one: Diagnosis, finding: Finding, other: Finding) -> Diagnosis:
+    """Return the diagnosis with another finding in the place of one."""
+    return replace(one, findings=tuple(other if every is finding else every for every in one.findings))
+
+
+def _likely(search: LoadSearch) -> bool:
+    """Return whether a load is more probable than none, a wrong declared mass among what is none, and may be told."""
+    return search.status != "none" and not search.doubts
+
+
+def _placed(finding: Finding, search: LoadSearch) -> Finding:
+    """Return a cause of weight, from which a load cannot be told, with that load on the segments of the search; the
+    load first where it was found, or likely where only the weight was named: the search has compared it with a wrong
+    declared mass, or with the reference, in every posture.
+    """
+    weight_only = any((alias.effect, alias.target) == UNPLACED_LOAD for alias in finding.set)
+    if not (search.found or weight_only):
+        return finding
+    bayes = next(alias.log_bayes_factor for alias in finding.set if alias.effect == LOAD)
+    here = tuple(Alias(LOAD, segment, bayes) for segment in search.segments)
+    others = tuple(alias for alias in finding.set if alias.effect != LOAD)
+    if _likely(search):
+        return replace(_finding(search, None), set=(*here, *others))
+    return replace(finding, set=(*others, *here))
+
+
+def _finding(search: LoadSearch, named: Finding | None) -> Finding:
+    """Return the load as a finding, with what the diagnosis knows of the one that it ``named``."""
+    best, bayes = search.best, {one.segment: one.log_bayes_factor for one in search.suspects}
+    own = Estimate("mass", best.mass, best.sd, "kg", best.interval)
+    place = zip("xyz", best.place, best.place_sd, strict=True)
+    parameters = (own, *(Estimate(f"place_{axis}", float(v), float(sd), "m") for axis, v, sd in place if v == v))
+    others = tuple(alias for alias in (named.set if named else ()) if alias.effect != LOAD)
+    alike = (*(Alias(LOAD, segment, bayes[segment]) for segment in search.segments), *others)
+    if named is None:
+        return Finding(LOAD, best.segment, parameters, alike, float("nan"), advice=AddedMass.advice)
+    return replace(named, target=best.segment, parameters=parameters, set=alike)
 
 
 _ANYWAY = ("standing_twist",)
@@ -87,24 +174,18 @@ def diagnose_session(
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = of_family(replace(whole, findings=with_plate_axes(whole.findings, plates)), family)
     weighed = with_weighed_load(result, whole)
-    whole = with_load(whole, _load_of(weighed, whole))
+    if not any(one.cause.of_person() for one in whole.findings):
+        whole = with_load(whole, weighed.identification.search if weighed.identification else None)
     whole = reconcile_with_checks(whole, weighed, judged_trials(weighed, found.looked_at))
     return replace(found, diagnosis=whole, judged=result)
 
 
 def _suspects(effects: Chosen[Effect | DiscreteEffect], result: SessionResult) -> Mapping[str, Cause]:
-    """Return the causes that may be named; a declared mass is none where nobody declared one: the plates weighed it."""
+    """Return the causes that may be named; no declared mass where the plates weighed the person."""
     family = causes(effects)
     if "mass" not in result.session.subject.guessed:
         return family
     return {name: one for name, one in family.items() if name != BodyMass.name} or family
-
-
-def _load_of(result: SessionResult, whole: Diagnosis) -> LoadSearch | None:
-    """Return the search for a load; None without one, or where a cause in the person is named already."""
-    if result.identification is None or any(one.cause.of_person() for one in whole.findings):
-        return None
-    return result.identification.search
 
 
 def _judged(
@@ -132,7 +213,8 @@ def _judged(
     tell("looking for causes")
     seen, own, looked_at, simulate = None, None, frozenset[str](), not failed
     if result.body is None or not fitted:
-        why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
+        told = (reason for one in result.trials if one.trial.role in FITTED_ROLES for reason in one.reasons)
+        why = f"No movement could be compared with a body. {result.body_source} {' '.join(dict.fromkeys(told))}".strip()
         bare = replace(bare, notes=(why, *bare.notes))
     else:
         own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
@@ -147,8 +229,9 @@ def _judged(
             looked_at, simulate = seen.problem.looked_at, simulate and not reasons
     found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
     tell("measuring what the findings change")
-    told = replace(_with_gains(result, found), looked_at=looked_at)
-    return replace(told, diagnosis=with_failed(failed, told.diagnosis)) if failed else told
+    before = result.identification.identification if result.identification else None
+    gained = replace(accepted(result, found, before), looked_at=looked_at)
+    return replace(gained, diagnosis=with_failed(failed, gained.diagnosis)) if failed else gained
 
 
 def _body_reasons(result: SessionResult, own: SessionTolerances) -> dict[Reason, tuple[str, ...]]:
@@ -195,9 +278,7 @@ def diagnosed_and_corrected(
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body, or the body that the session started from; None without
-    either.
-    """
+    """Return what an earlier session, or the body that this one started from, lets expect; None without either."""
     if reference is None or result.identification is None or reference.identification.status == "failed":
         return result.prior
     return expect_unloaded(reference.identification, result.identification.identification)
@@ -211,19 +292,3 @@ def _reference_note(reference: SessionIdentification | None) -> tuple[str, ...]:
         f"Session {reference.name} tells nothing of the body, so the table is what is known before. "
         f"{reference.identification.cause}",
     )
-
-
-def _reasons(result: SessionResult) -> str:
-    return " ".join(
-        dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED_ROLES for reason in trial.reasons)
-    )
-
-
-def _with_gains(result: SessionResult, found: Inferred) -> SessionDiagnosis:
-    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify
-    from.
-    """
-    before = result.identification.identification if result.identification else None
-    if not found.named or before is None:
-        return SessionDiagnosis(found.diagnosis, found, before)
-    return accepted(result, found, before)

@@ -1,6 +1,4 @@
-"""Write a session, one trial of it, or what was identified from it, in the formats of other programs; a trial with what
-was found: a copy of its C3D file with the results inside, or a recording for Rerun.
-"""
+"""A session, a trial of it, or its body, in the formats of other programs: models, C3D with results, Rerun."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -31,7 +29,7 @@ from biodance.pipeline.saved_results import doubt_told, kept_body, kept_trials, 
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import contact_of, movement_of, prepare_trial
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, Array, Motion, Session, Trial, Wrench
+from biodance.records import SIDES, Array, Motion, Session, Trial
 from biodance.settings import COP_FORCE
 from biodance.version import __version__
 
@@ -65,22 +63,20 @@ def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSoli
             f"{path}: the format rerun needs the library rerun-sdk ({error}). Install it with pip install rerun-sdk."
         ) from error
     with whole_file(path) as part:
-        _write(rerun, one, body, part, segment_solids(body) if solids is None else solids)
+        stream = rerun.RecordingStream("biodance", recording_id=f"{body.name} {one.name}")
+        stream.save(part)
+        stream.log("lab", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        _body(rerun, stream, one, body, segment_solids(body) if solids is None else solids)
+        if (markers := one.trial.markers) is not None:  # those that are seen in each frame
+            points = rerun.Points3D.columns(positions=markers.xyz[markers.seen])
+            lengths = markers.seen.sum(axis=1)
+            _send(rerun, stream, "lab/markers", markers.time, points.partition(lengths=lengths))
+        _forces(rerun, stream, one, body)
+        for j, joint in enumerate(body.joints):
+            angle = rerun.Scalars.columns(scalars=one.motion.known_angles[:, j])
+            _send(rerun, stream, f"angles/{joint.name}", one.motion.time, angle)
+        stream.flush()
     return path
-
-
-def _write(rerun: Any, one: TrialResult, body: Body, path: Path, solids: SegmentSolids) -> None:
-    assert one.motion is not None
-    stream = rerun.RecordingStream("biodance", recording_id=f"{body.name} {one.name}")
-    stream.save(path)
-    stream.log("lab", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    _body(rerun, stream, one, body, solids)
-    _markers(rerun, stream, one)
-    _forces(rerun, stream, one, body)
-    for j, joint in enumerate(body.joints):
-        angle = one.motion.known_angles[:, j]
-        _send(rerun, stream, f"angles/{joint.name}", one.motion.time, rerun.Scalars.columns(scalars=angle))
-    stream.flush()
 
 
 def _send(rerun: Any, stream: "RecordingStream", place: str, time: Array, columns: Any) -> None:
@@ -95,66 +91,34 @@ def _body(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body, s
         if name not in solids:
             continue
         mesh = solids[name]
-        shape = rerun.Mesh3D(
-            vertex_positions=mesh.vertices,
-            triangle_indices=mesh.faces,
-            vertex_normals=mesh.vertex_normals,
-            albedo_factor=_SKIN,
-        )
+        surface = {"vertex_positions": mesh.vertices, "triangle_indices": mesh.faces}
+        shape = rerun.Mesh3D(**surface, vertex_normals=mesh.vertex_normals, albedo_factor=_SKIN)
         stream.log(f"lab/body/{name}", shape, static=True)
-        moved = rerun.Transform3D.columns(
-            translation=pose.position[:, k], quaternion=Rotation.from_matrix(pose.rotation[:, k]).as_quat()
-        )
+        turn = Rotation.from_matrix(pose.rotation[:, k]).as_quat()
+        moved = rerun.Transform3D.columns(translation=pose.position[:, k], quaternion=turn)
         _send(rerun, stream, f"lab/body/{name}", time, moved)
     centre = centre_of_mass(body, one.motion)
     _send(rerun, stream, "lab/centre_of_mass", time, rerun.Points3D.columns(positions=centre, radii=[0.02] * len(time)))
 
 
-def _markers(rerun: Any, stream: "RecordingStream", one: TrialResult) -> None:
-    """Send the markers that are seen in each frame."""
-    markers = one.trial.markers
-    if markers is None:
-        return
-    seen = markers.seen
-    points = rerun.Points3D.columns(positions=markers.xyz[seen]).partition(lengths=seen.sum(axis=1))
-    _send(rerun, stream, "lab/markers", markers.time, points)
-
-
 def _forces(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body) -> None:
-    """Send plates, their forces at the centres of pressure, and what the body leaves unexplained at its centre of
-    mass.
-    """
+    """Send plates with their forces at the centres of pressure, and what is unexplained at the centre of mass."""
     assert one.motion is not None
+    arrows = []  # name, times, forces, where they act, colour
     for plate in one.trial.plates:
         corners = [np.vstack([plate.corners, plate.corners[:1]])]
         stream.log(f"lab/plates/{plate.name}", rerun.LineStrips3D(corners), static=True)
         cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)
-        _arrows(rerun, stream, f"lab/forces/{plate.name}", plate.wrench.time, plate.wrench.force, cop, _MEASURED)
+        arrows.append((plate.name, plate.wrench.time, plate.wrench.force, cop, _MEASURED))
     if one.comparison is not None:
         found = one.comparison
         left = np.where(found.used[:, None], found.measured - predict_wrench(body, one.motion).value, np.nan)[:, :3]
-        centre = centre_of_mass(body, one.motion)
-        _arrows(rerun, stream, "lab/forces/residual", found.time, left, centre, _RESIDUAL)
-
-
-def _arrows(
-    rerun: Any,
-    stream: "RecordingStream",
-    place: str,
-    time: Array,
-    force: Array,
-    at: Array,
-    colour: tuple[int, int, int],
-) -> None:
-    """Send one arrow a frame; none where force or place are not known."""
-    known = np.isfinite(force).all(axis=1) & np.isfinite(at).all(axis=1)
-    columns = rerun.Arrows3D.columns(
-        vectors=force[known] / _NEWTONS_PER_METRE, origins=at[known], colors=[colour] * int(known.sum())
-    )
-    _send(rerun, stream, place, time, columns.partition(lengths=known.astype(int)))
-
-
-_NAMES = {True: "Foot Strike", False: "Foot Off"}
+        arrows.append(("residual", found.time, left, centre_of_mass(body, one.motion), _RESIDUAL))
+    for name, time, force, at, colour in arrows:
+        known = np.isfinite(force).all(axis=1) & np.isfinite(at).all(axis=1)
+        sized = {"vectors": force[known] / _NEWTONS_PER_METRE, "origins": at[known]}
+        columns = rerun.Arrows3D.columns(**sized, colors=[colour] * int(known.sum()))
+        _send(rerun, stream, f"lab/forces/{name}", time, columns.partition(lengths=known.astype(int)))
 
 
 def results_into_c3d(
@@ -187,35 +151,30 @@ def results_into_c3d(
             f"Trial {trial}: comes from a file of the format {one.trial.source.format}. Only a C3D file is copied as "
             f"one."
         )
-    outputs = [*_angles(body, one)]
+    angle = np.radians(one.motion.known_angles)
+    outputs = [
+        Output(f"{name}Angles", "ANGLES", _three(angle[:, columns]), axes, turns=False)
+        for name, columns, axes in _groups(body)
+    ]
     centre = np.where(one.motion.determined[:, None], centre_of_mass(body, one.motion), np.nan)
     outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre, "x, y, z"))
-    contact = contact_of(one.trial, one, body)
+    contact = contact_of(one, body)
     if one.comparison is not None:
         outputs += _wrenches(body, one)
     if contact is not None:
         outputs += _loads(body, one, contact)
-    events = tuple(
-        Event(event.time, event.side.title(), _NAMES[event.down]) for event in movement_of(one, body, None).events
-    )
-    said: dict[str, FileValue] = {
-        "VERSION": [__version__],
-        "SOURCE": [source[:255]],
-        "SEGMENTS": list(body.segments),
-        "MASS": body.sip.mass,
-        "NOT_MEASURED": [
-            f"{span.joint} {span.state.words} {span.start:.3f} {span.end:.3f} s"[:255] for span in one.motion.spans()
-        ][:255]
-        or ["none"],
-    }
+    names = {True: "Foot Strike", False: "Foot Off"}
+    found = movement_of(one, body, None).events
+    events = tuple(Event(event.time, event.side.title(), names[event.down]) for event in found)
+    spans = [f"{s.joint} {s.state.words} {s.start:.3f} {s.end:.3f} s"[:255] for s in one.motion.spans()][:255]
+    said: dict[str, FileValue] = {"VERSION": [__version__], "SOURCE": [source[:255]]}
+    said |= {"SEGMENTS": list(body.segments), "MASS": body.sip.mass, "NOT_MEASURED": spans or ["none"]}
     write_results_c3d(path, one.trial.source.path, outputs=outputs, events=events, parameters=said, subject=subject)
     return path, f"The recording of trial {trial} with {len(outputs)} results and {len(events)} events. {source}"
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
-    """Yield name (``RightHip``), indices and names of the axes (``flexion, adduction, rotation``) of every joint of
-    the body.
-    """
+    """Yield name (``RightHip``), indices and names of the axes (``flexion, rotation``) of every joint of the body."""
     chain: list[int] = []
     for i, joint in enumerate(body.joints):
         chain.append(i)
@@ -233,13 +192,6 @@ def _three(values: Array) -> Array:
     """Return (T, 3): up to three columns, the rest zero."""
     some = values[:, :3]
     return np.pad(some, ((0, 0), (0, 3 - some.shape[1])))
-
-
-def _angles(body: Body, one: TrialResult) -> Iterator[Output]:
-    assert one.motion is not None
-    angle = np.radians(one.motion.known_angles)
-    for name, columns, axes in _groups(body):
-        yield Output(f"{name}Angles", "ANGLES", _three(angle[:, columns]), axes, turns=False)
 
 
 def _loads(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
@@ -263,12 +215,8 @@ def _wrenches(body: Body, one: TrialResult) -> Iterator[Output]:
     assert one.motion is not None
     assert one.comparison is not None
     found = one.comparison
-    predicted = predict_wrench(body, one.motion)
-    for word, wrench in (
-        ("Measured", Wrench(found.time, found.measured)),
-        ("Predicted", replace(predicted, time=found.time)),
-    ):
-        value = np.where(found.used[:, None], wrench.value, np.nan)
+    for word, wrench in (("Measured", found.measured), ("Predicted", predict_wrench(body, one.motion).value)):
+        value = np.where(found.used[:, None], wrench, np.nan)
         yield Output(f"{word}GroundForce", "FORCES", value[:, :3], "x, y, z of the ground's force on the subject")
         yield Output(f"{word}GroundMoment", "MOMENTS", value[:, 3:], "x, y, z of its moment about the lab origin")
 
@@ -356,7 +304,10 @@ def export(
         raise BiodanceError(_NO_TRIAL.format(format))
     target = _Target(Path(out), format, subject, meshes)
     if isinstance(source, str | Path) and str(source) in _SHIPPED and not Path(str(source)).exists():
-        return _robot(str(source), target)
+        if format in MOTION_FORMATS:
+            raise SessionRefused(f"{source}: is a robot and no trial. Give a session folder to export {format}.")
+        robot = _SHIPPED[str(source)]()
+        return target.body(robot, " ".join(robot.notes))
     if isinstance(source, SessionResult):
         return _of_result(source, trial, target)
     session = source if isinstance(source, Session) else None
@@ -376,9 +327,7 @@ def export(
 
 @dataclass(frozen=True)
 class _Target:
-    """What to write: a file or folder ``out`` of a ``format``; ``subject`` chooses the person of a C3D file, ``meshes``
-    the folder with the solids of the segments. Every method returns the path and what it holds.
-    """
+    """What to write, of whom, with which solids; every method returns the path and what it holds."""
 
     out: Path
     format: str
@@ -459,13 +408,6 @@ def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tup
         trial = _chosen(result.session, trial).name
     chosen = result.trials if trial is None else (result[trial],)
     return target.trials(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, words)
-
-
-def _robot(name: str, target: _Target) -> tuple[Path, str]:
-    if target.format in MOTION_FORMATS:
-        raise SessionRefused(f"{name}: is a robot and no trial. Give a session folder to export {target.format}.")
-    body = _SHIPPED[name]()
-    return target.body(body, " ".join(body.notes))
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:

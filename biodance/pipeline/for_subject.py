@@ -11,12 +11,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.cycles.summary import Repetitions
-from biodance.identification.knowledge import SIGMAS, Known, known_together
+from biodance.identification.knowledge import SIGMAS, known_together
 from biodance.lab.session.file import VisitEntry, read_session_file
 from biodance.motion.newton import QuietStanding
-from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.trial_result import OPEN
 from biodance.records import Subject
 from biodance.settings import STANDARD_GRAVITY
@@ -67,11 +66,7 @@ def account_for(
     result: SessionResult, diagnosis: SessionDiagnosis | None = None, movement: SessionMovement | None = None
 ) -> SubjectAccount:
     """Return what the subject may be told of a session, of its ``diagnosis`` and its ``movement`` where they were made.
-
-    Raises
-    ------
-    SessionRefused
-        ``session.toml`` cannot be read.
+    Raises SessionRefused: ``session.toml`` cannot be read.
     """
     visit = read_session_file(result.session.folder).visit
     withheld, kinds = _withheld(result, diagnosis), movement.repetitions.values() if movement else ()
@@ -79,7 +74,13 @@ def account_for(
     if withheld or result.identification is None:
         return SubjectAccount(result.subject, visit, withheld=withheld, body=result.body, moved=moved)
     one, standing = result.identification.identification, result.standing
-    masses = tuple(_part(known) for known in one.known if known.quantity == "mass")
+    masses = tuple(  # none where the session cannot know it
+        PartMass((known.segment,))
+        if known.verdict == "cannot be known"
+        else PartMass((known.segment,), max(known.interval[0], 0.0), known.interval[1], known.verdict == "known")
+        for known in one.known
+        if known.quantity == "mass"
+    )
     weight = _weight(standing) if standing else SubjectAccount.weight
     sums = known_together(one.sip)
     together = None
@@ -90,9 +91,7 @@ def account_for(
 
 
 def _weight(standing: QuietStanding) -> tuple[float, float]:
-    """Return the 95 % interval, kg, of who stands still: plates sway with the person, and read a little wrong
-    throughout, in proportion to the load and by the zero of each of them.
-    """
+    """Return the 95 % interval, kg, of who stands: plates sway with the person, and err by their gains and zeros."""
     known = shipped()
     # sd² = sway² + (gain m)² + P (zero / g)²: the readings of all P plates are summed.
     zeros = np.sqrt(len(standing.plates)) * known.size("plate_offset Fz") / STANDARD_GRAVITY
@@ -114,11 +113,3 @@ def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tupl
     if diagnosis and not diagnosis.diagnosis.is_clean:
         reasons.append(WHY_FAULTY)
     return tuple(dict.fromkeys(reasons))
-
-
-def _part(known: Known) -> PartMass:
-    """Return the range of one segment, none where the session cannot know it."""
-    if known.verdict == "cannot be known":
-        return PartMass((known.segment,))
-    low, high = known.interval
-    return PartMass((known.segment,), max(low, 0.0), high, known.verdict == "known")

@@ -1,6 +1,4 @@
-"""What ``import biodance`` conducts: what an analyst asks of a visit; the commands call the same functions. Markers and
-forces of one trial, recorded apart, are made one session first: read, track, align, refine, write.
-"""
+"""What ``import biodance`` and the commands ask of a visit, with markers and forces registered first."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,13 +21,13 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.motion.soles import soles_from_body
 from biodance.motion.track import track
 from biodance.pipeline.body import body_of, refuse_another_reference
-from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
+from biodance.pipeline.diagnosis import diagnose_session, diagnosed_and_corrected
 from biodance.pipeline.front_dance import performance_of
-from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.lab_file import read_lab
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import known_body
-from biodance.pipeline.session import by_paper, followed, identification_of
+from biodance.pipeline.session import by_paper, followed, identification_of, identify_result
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Motion, Session, Trial
@@ -50,10 +48,6 @@ Visit: TypeAlias = Session | SessionResult | str | Path
 Earlier: TypeAlias = SessionIdentification | Visit
 """An earlier session: as identified, or anything that can be."""
 _Tell: TypeAlias = Callable[[str], None]
-
-
-def _silent(_: str) -> None:
-    """Tell nobody."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +108,7 @@ def identify(
     body: Body | str | Path | None = None,
     lab: str | Path | None = None,
     method: Literal["posterior", "paper"] = "posterior",
-    tell: _Tell = _silent,
+    tell: _Tell = lambda _: None,
 ) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
 
@@ -165,7 +159,7 @@ def identify(
     >>> identified  # doctest: +ELLIPSIS
     SessionIdentification('visit': solved, 12 segments, 61... kg)
     """
-    before = None if reference is None else _earlier(reference, tell)
+    before = _earlier(reference, tell) if reference is not None else None
     result = followed_visit(session, reference=before, body=body, lab=lab, tell=tell)
     result, _ = diagnosed_and_corrected(result, reference=before, tolerances=read_lab(lab).tolerances, tell=tell)
     found = identification_of(by_paper(result) if method == "paper" else result)
@@ -180,7 +174,7 @@ def diagnose(
     tolerances: Tolerances | None = None,
     body: Body | str | Path | None = None,
     lab: str | Path | None = None,
-    tell: _Tell = _silent,
+    tell: _Tell = lambda _: None,
 ) -> SessionDiagnosis:
     """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming
     it gains.
@@ -239,7 +233,7 @@ def diagnose(
     return diagnose_session(result, reference=before, tolerances=known, effects=asked, tell=tell)
 
 
-def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:
+def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = lambda _: None) -> SessionComparison:
     """Return what changed in a person from an earlier visit to a later one.
 
     Parameters
@@ -277,11 +271,9 @@ def followed_visit(
     reference: SessionIdentification | None = None,
     body: Body | str | Path | None = None,
     lab: str | Path | None = None,
-    tell: _Tell = _silent,
+    tell: _Tell = lambda _: None,
 ) -> SessionResult:
-    """Return the visit `followed`; one that was examined already is followed again only where ``body`` or ``lab``
-    change it.
-    """
+    """Return the visit `followed`; one that was examined only where ``body`` or ``lab`` change it."""
     carried, known = read_lab(lab), known_body(body)
     if isinstance(session, SessionResult) and known is None and not carried.corrections:
         return session if reference is None else _beside(session, reference)
@@ -291,10 +283,7 @@ def followed_visit(
 
 
 def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
-    """Return what a visit says about the body."""
-    if isinstance(session, SessionIdentification):
-        return session
-    return identify(session, tell=tell)
+    return session if isinstance(session, SessionIdentification) else identify(session, tell=tell)
 
 
 def _beside(result: SessionResult, before: SessionIdentification) -> SessionResult:
@@ -303,11 +292,7 @@ def _beside(result: SessionResult, before: SessionIdentification) -> SessionResu
     if result.body is None or found is None or found.search.reference == f"session {before.name}":
         return result
     refuse_another_reference(before.identification.body, result.body, result.subject.mass, before.name)
-    name = result.session.folder.name
-    again = identify_trials(
-        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior,
-        corrections=result.corrections, weighed=result.weighed,
-    )  # fmt: skip
+    again = identify_result(result, result.body, before)
     return replace(result, identification=replace(again, corrected=found.corrected))
 
 
@@ -317,9 +302,7 @@ _RAISED = 0.03
 
 @dataclass(frozen=True, eq=False)
 class _Moving:
-    """Who moved how: the ``session`` of the markers, its trial as ``recorded`` and ``trial`` prepared without plates,
-    the ``body`` and its ``motion``.
-    """
+    """The ``session`` of the markers, its trial as ``recorded`` and prepared, the ``body`` and its ``motion``."""
 
     session: Session
     recorded: Trial
@@ -389,7 +372,12 @@ def register(
     try:
         hypotheses = _hypotheses(moving, measured)
         tell("refining the pose")
-        judge = partial(_tolerances, moving.body, recorded)
+
+        # what is no fault in a look, with the noise of its own cameras and of the plates as recorded
+        def judge(window: TrialWindow) -> Tolerances:
+            seen = replace(window.trial, plates=recorded.plates)
+            return own_tolerances(moving.body, (window,), (seen,)).tolerances
+
         refine = partial(refined, moving.body, moving.trial, moving.motion, measured, tolerances=judge)
         found = refine(hypotheses[0].pose)
         others = rival_delays(hypotheses, found, refine)
@@ -402,11 +390,6 @@ def register(
         plates = registered_plates(recorded.plates, registration.pose)
         write_registered(folder, moving.session, moving.recorded, plates, said=registration.document())
     return registration
-
-
-def _tolerances(body: Body, recorded: Trial, window: TrialWindow) -> Tolerances:
-    """Return what is no fault in a look, with the noise of its own cameras and of the plates as recorded."""
-    return own_tolerances(body, (window,), (replace(window.trial, plates=recorded.plates),)).tolerances
 
 
 def _moving(markers: Path, forces: Path, tell: Callable[[str], None]) -> _Moving:
@@ -428,9 +411,7 @@ def _moving(markers: Path, forces: Path, tell: Callable[[str], None]) -> _Moving
 
 
 def _chosen(session: Session, markers: Path, forces: Path) -> Trial:
-    """Return the trial of a marker file; in a folder the moving trial that is called as the force file, else the only
-    one.
-    """
+    """Return the trial of a marker file; in a folder the moving one called as the force file, else the only one."""
     if not markers.is_dir():
         same = [trial for trial in session if trial.source.path.resolve() == markers.resolve()]
         if not same:

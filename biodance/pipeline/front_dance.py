@@ -1,6 +1,4 @@
-"""What ``import biodance`` conducts before a visit: a dance to be recorded, or a laboratory to be simulated, with the
-designed dance performed by a virtual person.
-"""
+"""What is conducted before a visit: a dance to be recorded, or a laboratory to be simulated."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -14,26 +12,33 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import Phase
-from biodance.errors import BiodanceError, SessionRefused, UnknownName
+from biodance.errors import BiodanceError, SessionRefused, refuse_unknown
 from biodance.motion.dynamics import predict_wrench
-from biodance.records import SIDES, Array, Motion, Subject
+from biodance.records import SIDES, Array, Subject
 from biodance.spatial import zero_moment_point
-from biodance.virtual_lab.causes import Hidden, hide
-from biodance.virtual_lab.movement.performance import ARM, USUAL_PERFORMER, Performance, Performer, Shown, copy_dance
+from biodance.virtual_lab.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.movement.performance import (
+    ARM,
+    PERFORMERS,
+    USUAL_PERFORMER,
+    Performance,
+    Performer,
+    Shown,
+    copy_dance,
+)
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.movement.protocol import STAND, Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.simulate import write_visit
-from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, perform_in
+from biodance.virtual_lab.simulate import check_simulated, write_visit
+from biodance.virtual_lab.simulate import simulate_session as write_session
+from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
 if TYPE_CHECKING:
-    from biodance.dance.dance import Dance
     from biodance.dance.expectation import PerformanceScore
     from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance import DanceResult
     from biodance.pipeline.results import SessionResult
-    from biodance.virtual_lab.causes import Hidden
 
 
 _RATE = 100.0
@@ -51,45 +56,33 @@ _BENT = {
 
 
 def stretches(dance: Dance) -> tuple[Shown, ...]:
-    """Return the dance in stretches between the steps by which a foot changes its place; the steps themselves are not
-    recorded.
-    """
+    """Return the dance in stretches between the steps that change a foot's place, which are not recorded."""
     motion, groups = dance.motion(_RATE), [[0]]
     for p in range(1, len(dance.stances)):
+        # a posture on feet set anew begins another stretch
         same = np.array_equal(dance.stances[p].ankle, dance.stances[p - 1].ankle)
         groups[-1].append(p) if same else groups.append([p])
     out = []
     for number, group in enumerate(groups, start=1):
         if len(group) > 1:
-            mine = [
-                phase
-                for phase in dance.phases
-                if phase.posture in group and (phase.kind == "hold" or phase.posture > group[0])
-            ]
-            out.append(_shown(dance, motion, mine, f"dance_{number}"))
+            # a move belongs to the posture it leads to: that into the first one of a stretch is the step, not
+            # recorded
+            own = [phase for phase in dance.phases if phase.posture in group]
+            phases = [phase for phase in own if phase.kind == "hold" or phase.posture > group[0]]
+            rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
+            part, feet = motion.at(rows), phases[0].stance
+            raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
+            point = zero_moment_point(predict_wrench(dance.body, part).value)[:, :2]
+            out.append(Shown(f"dance_{number}", dance.body, part, feet.ankle, raised, point, feet.seat))
     return tuple(out)
 
 
-def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Shown:
-    rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
-    part = motion.at(rows)
-    raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
-    point = zero_moment_point(predict_wrench(dance.body, part).value)[:, :2]
-    feet = phases[0].stance
-    return Shown(name, dance.body, part, feet.ankle, raised, point, feet.seat)
-
-
 def _on_the_stool(dance: Dance, danced: tuple[Shown, ...]) -> tuple[Shown, ...]:
-    """Return what is recorded on a stool beside the dance: sitting still as the static trial, and the cards' second
-    round to validate on.
-    """
+    """Return what is recorded on a stool, too: sitting still (static), and a second round to validate on."""
     x = np.zeros((round(_SITS * _RATE) + 1, dance.chain.size))
     x[:, 2] = danced[0].seat
-    arms = {
-        f"{side}_{name}": a
-        for side in SIDES
-        for name, a in zip(ARM, np.radians(STAND.values[f"{side}_arm"]), strict=True)
-    }
+    stood = {side: zip(ARM, np.radians(STAND.values[f"{side}_arm"]), strict=True) for side in SIDES}
+    arms = {f"{side}_{name}": angle for side, pairs in stood.items() for name, angle in pairs}
     for name, angle in (_BENT | arms).items():
         x[:, ROOT + dance.body.joint_index(name)] = angle
     still = dance.chain.motion(np.arange(len(x)) / _RATE, x, *np.zeros((2, *x.shape)))
@@ -104,6 +97,7 @@ def _raised(dance: Dance, phase: Phase, time: Array) -> Array:
     for foot in {0, 1} - set(phase.stance.planted):
         up = np.ones(time.size)
         if phase.kind == "move":
+            # up in the first share of a move from a stance in which the foot stood, down in the last of one into such
             way = (time - phase.start) / (phase.end - phase.start)
             before, after = (foot in dance.stances[p].planted for p in (phase.posture - 1, phase.posture))
             up = (septic(way / LIFT) if before else up) * (septic((1 - way) / LIFT) if after else 1.0)
@@ -119,7 +113,6 @@ def simulate_dance(
     seed: int,
     performer: Performer = USUAL_PERFORMER,
     hidden: tuple[Hidden, ...] = (),
-    visit: LabVisit = FIRST_VISIT,
 ) -> Path:
     """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats
     for validation; on a stool, which stands on the plate, sitting still and a second round instead.
@@ -138,7 +131,7 @@ def simulate_dance(
     shown = {one.name: one for one in (*danced, *(_on_the_stool(dance, danced) if seated else ()))}
     trials = [one.plan(round(float(np.ptp(one.motion.time)) * performer.pace, 1)) for one in shown.values()]
     plan = Protocol(dance.protocol, "a designed dance", (*others, *trials))
-    visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
+    visit, loads = hide(hidden, subject, plan, seed=seed, visit=FIRST_VISIT)
 
     def performed(instruments: Instruments, person: Person, trial: TrialPlan) -> Performance:
         if trial.name not in shown:
@@ -271,7 +264,6 @@ def verify_dance(
     >>> all(margin.worst >= 0 for margin in margins)
     True
     """
-    from biodance.dance.dance import Dance
     from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
@@ -339,12 +331,6 @@ def simulate(
     >>> sorted(path.name for path in folder.iterdir())
     ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
     """
-    from biodance.virtual_lab.causes import hide, parse_cause
-    from biodance.virtual_lab.movement.protocol import read_protocol
-    from biodance.virtual_lab.simulate import check_simulated
-    from biodance.virtual_lab.simulate import simulate_session as write_session
-    from biodance.virtual_lab.visit import FIRST_VISIT, LabVisit, draw_laboratory
-
     check_simulated(subject)
     hidden = tuple(parse_cause(text) for text in effects)
     if (protocol is None) == (dance is None):
@@ -352,42 +338,20 @@ def simulate(
     if dance is not None or protocol is None:
         if lab_seed is not None:
             raise BiodanceError("A laboratory of the family is for protocols. Give --protocol with --lab-seed.")
-        return _danced(subject, dance, Path(out), seed=seed, performer=performer, hidden=hidden)
-    plan, visit = read_protocol(protocol), FIRST_VISIT
-    if lab_seed is not None:
-        visit = LabVisit(laboratory=draw_laboratory(lab_seed))
+        refuse_unknown("performer", performer, PERFORMERS)
+        one = dance if isinstance(dance, Dance) else Dance.load(str(dance))
+        return simulate_dance(subject, one, Path(out), seed=seed, performer=PERFORMERS[performer], hidden=hidden)
+    plan = read_protocol(protocol)
+    visit = FIRST_VISIT if lab_seed is None else LabVisit(laboratory=draw_laboratory(lab_seed))
     visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
-
-
-def _danced(
-    subject: Subject,
-    dance: "Dance | str | Path | None",
-    out: Path,
-    *,
-    seed: int,
-    performer: str,
-    hidden: "tuple[Hidden, ...]",
-) -> Path:
-    """Write the visit of a person who performs a dance."""
-    from biodance.dance.dance import Dance
-    from biodance.virtual_lab.movement.performance import PERFORMERS
-
-    if performer not in PERFORMERS:
-        raise UnknownName.of("performer", performer, tuple(PERFORMERS))
-    one = dance if isinstance(dance, Dance) else Dance.load(str(dance))
-    return simulate_dance(subject, one, out, seed=seed, performer=PERFORMERS[performer], hidden=hidden)
 
 
 def virtual_subject(
     dance: "Dance | None", *, sex: str | None, height: float | None, mass: float | None, age: float
 ) -> Subject:
-    """Return the person to simulate: as said, else the one for whom the ``dance`` was designed.
-
-    Raises
-    ------
-    BiodanceError
-        Sex, height or mass is missing, and the dance does not know its person either.
+    """Return the person to simulate: as said, else the one for whom the ``dance`` was designed. Raises BiodanceError:
+    sex, height or mass is missing, and the dance does not know its person either.
     """
     known = dance.subject if dance is not None else None
     said = {"sex": sex, "height": height, "mass": mass}
@@ -412,7 +376,6 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     BiodanceError
         The dance is of another body, or nothing was recorded.
     """
-    from biodance.dance.dance import Dance
     from biodance.dance.expectation import score_performance
     from biodance.dance.visit_log import read_visit_logs
     from biodance.pipeline.identification import FITTED_ROLES

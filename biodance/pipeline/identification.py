@@ -1,7 +1,4 @@
-"""A session's masses, stage by stage: frames of all trials, what the data alone tell, the most probable possible body,
-what it is worth on kept trials, an added load; and its quality table, a few numbers beside their limits
-(`biodance.settings.CheckLimits`).
-"""
+"""A session's masses, stage by stage, what they are worth on kept trials, an added load; and the quality table."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -62,6 +59,7 @@ def load_doubts(checks: Iterable[Check], *, weighed: bool) -> tuple[str, ...]:
 
 def _upper(what: str, where: str, value: float, limit: float, unit: str, advice: str) -> Check:
     inside = bool(value <= limit)
+    # as few digits as leave the printed value on the same side of its limit
     digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
     return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:g} {unit}", inside, advice)
 
@@ -97,9 +95,7 @@ def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[
 
 
 def trial_checks(result: TrialResult, mass: float) -> list[Check]:
-    """Check marker distances, gaps, measured frames and forces of one trial; ``mass`` kg of the body, for the body
-    weight.
-    """
+    """Check marker distances, gaps, measured frames and forces of one trial of a body of ``mass`` kg."""
     name, limits, found = result.trial.name, result.trial.settings.checks, []
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
@@ -140,22 +136,20 @@ allow.
 
 def unexplained_mass(fitted: tuple[TrialValidation, ...], gravity: float) -> float:
     """Return how many kg more the plates carry than the identified body, in the mean over the fitted trials."""
+    # in the mean nobody accelerates upwards, so that the vertical force left over is a weight
     beyond = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted])
     return float(beyond.mean()) / gravity
 
 
 def weight_notes(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
-    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the
-    declared mass.
-    """
+    """Say where plates and body differ in weight: the table's total is pinned to the declared mass."""
     missing = unexplained_mass(fitted, gravity)
-    if abs(missing) <= UNEXPLAINED:
-        return []
-    return [
+    said = (
         f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose "
         "total is tied to the declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single "
         "segments and their changes absorb it; see Added mass."
-    ]
+    )
+    return [said] if abs(missing) > UNEXPLAINED else []
 
 
 _STANDING, _MOVING = 0.002, 0.005
@@ -179,17 +173,13 @@ def weigh(session: Session, standing: QuietStanding | None) -> Weighing | None:
     mass = session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
     strides = [one for trial in seen for one in StrideForce().whole(trial) if one.unit == "kg"]
-    found = _median([(one.trial, one.value, one.sd) for one in strides], WeighedBy.STRIDES)
-    if found is not None:
-        return found
     told = [(one.trial.name, one.newton.mass, one.newton.mass_sd) for one in seen if one.newton]
-    return _median(told, WeighedBy.NEWTON)
+    by_strides = _median([(one.trial, one.value, one.sd) for one in strides], WeighedBy.STRIDES)
+    return by_strides or _median(told, WeighedBy.NEWTON)
 
 
 def with_weighed_mass(session: Session) -> Session:
-    """Return a session whose subject has the mass that the plates show while somebody moves on them, where nobody
-    declared one or stood still: by whole strides, or by the force against the trunk's acceleration.
-    """
+    """Return a session with the mass that moving on the plates shows, where nobody declared or stood it."""
     found = None if np.isfinite(session.subject.mass) else weigh(session, None)
     if found is None:
         return session
@@ -204,6 +194,7 @@ def _median(found: list[tuple[str, float, float]], by: WeighedBy) -> Weighing | 
         return None
     masses = np.array([value for _, value, _ in known])
     mass = float(np.median(masses))
+    # 1.4826 MAD is the sd of normal values; that of their mean is smaller by the root of their number
     scatter = 1.4826 * float(np.median(np.abs(masses - mass))) / len(known) ** 0.5
     sd = float(np.linalg.norm([_MOVING * mass, scatter, min(own for *_, own in known)]))
     return Weighing(mass, sd, by, tuple(dict.fromkeys(name for name, *_ in known)))
@@ -309,9 +300,7 @@ class SessionIdentification(Sendable):
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
-        """How far each quantity was pulled from its prior and what it means for knee and hip in the trial of
-        `torques`, the largest impact first.
-        """
+        """Pull of each quantity and what it means for knee and hip in `torques`, largest first."""
         if self.torques is None or self.shown is None or self.shown.motion is None:
             return ()
         return impacts(self.identification, self.shown.motion, self.torques.use)
@@ -387,7 +376,12 @@ def identify_trials(
     search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
     lies_on = nearest_segment(body, tuple(fit.motion for fit in fits), search.best.segment, search.best.place)
     load = replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference)
-    changes = _changes(reference, found, failures)
+    changes: tuple[Difference, ...] = ()
+    if reference is not None and found.status != "failed":
+        try:
+            changes = differences(reference.identification, found)
+        except NotSolved as why:
+            failures["differences"] = str(why)
     one = SessionIdentification(name, found, (), (), {}, None, load, changes, notes=found.notes, failures=failures)
     told = one if found.status == "failed" else predicted(one, results, weighed, corrections)
     return _weighed(told, reference) if reference is not None and found.status == "solved" else told
@@ -395,9 +389,18 @@ def identify_trials(
 
 def _weighed(one: SessionIdentification, reference: SessionIdentification) -> SessionIdentification:
     """Return the same with a note of what plates and scale say about the weight of both sessions, where they differ."""
-    then, now = (_weights(some) for some in (reference, one))
+    # (declared, on the plates over the fitted trials) kg, in the session before and in this one
+    then, now = (
+        (
+            float(some.identification.posterior.prior.mass.sum()),
+            float(some.identification.sip.mass.sum())
+            + unexplained_mass(some.fitted, -float(some.identification.body.gravity[2])),
+        )
+        for some in (reference, one)
+    )
     declared, carried = now[0] - then[0], now[1] - then[1]
     gain, scale = around_zero("plate_gain Fz") * then[1], error_size("scale", "mass")
+    # each of two sessions errs by itself: the sd of a difference is the root of 2 times as large
     limits = [SIGMAS * np.sqrt(2.0) * sd for sd in (scale, gain)]
     if abs(declared) <= limits[0] and abs(carried) <= limits[1]:
         return one
@@ -410,26 +413,6 @@ def _weighed(one: SessionIdentification, reference: SessionIdentification) -> Se
     return replace(one, notes=(*one.notes, note))
 
 
-def _weights(one: SessionIdentification) -> tuple[float, float]:
-    """Return the declared mass and what the plates carried over the fitted trials, kg."""
-    gravity = -float(one.identification.body.gravity[2])
-    body = float(one.identification.sip.mass.sum())
-    return float(one.identification.posterior.prior.mass.sum()), body + unexplained_mass(one.fitted, gravity)
-
-
-def _changes(
-    reference: SessionIdentification | None, found: Identification, failures: dict[str, str]
-) -> tuple[Difference, ...]:
-    """Return what changed since the session ``reference``; why that cannot be told is added to ``failures``."""
-    if reference is None or found.status == "failed":
-        return ()
-    try:
-        return differences(reference.identification, found)
-    except NotSolved as why:
-        failures["differences"] = str(why)
-        return ()
-
-
 def predicted(
     one: SessionIdentification,
     results: tuple[TrialResult, ...],
@@ -437,12 +420,15 @@ def predicted(
     corrections: tuple[PlateCorrection, ...] = (),
 ) -> SessionIdentification:
     """Return the same with what the identified body predicts of all trials, in which ``corrections`` were made."""
+    told_of = [one for one in results if one.motion is not None and one.comparison is not None and one.trial.plates]
+    shown = (one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told_of if one.trial.role == role)
     found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
     parts = [fits_of_roles(results, roles, *corrections) for roles in (FITTED_ROLES, KEPT_ROLES)]
     about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
     notes, on_same, plates = list(one.notes), _on_fitted_plates(results), None
     if on_same.intersection(fit.name for fit in parts[1]):
         beside, table = (one.posterior or one).identification, found.body.sip
+        # the table of a person of the weighed mass: all ten parameters of a segment grow with it
         share = (mass or table.mass.sum()) / table.mass.sum()
         weighed_table = replace(found.body, sip=Sip(table.segments, share * table.phi, table.covariance))
         of_table, own = plate_readings(beside, parts[0], weighed_table, identified)
@@ -463,7 +449,7 @@ def predicted(
         validations=kept,
         agreements={f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in every},
         gain=kept_gain(kept, notes),
-        shown=_shown(results),
+        shown=next(shown, None),  # the first trial kept, else fitted, whose plates tell what each foot carries
         notes=tuple(notes),
     )
 
@@ -476,12 +462,6 @@ def _on_fitted_plates(results: tuple[TrialResult, ...]) -> frozenset[str]:
     }
     fitted = set[str]().union(*(on[one.name] for one in results if one.trial.role in FITTED_ROLES))
     return frozenset(name for name, plates in on.items() if plates <= fitted)
-
-
-def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
-    """Return the first trial kept, else the first fitted, whose plates tell what each foot carries."""
-    told = [one for one in results if one.motion is not None and one.comparison is not None and one.trial.plates]
-    return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
 
 
 def fits_of_roles(results: tuple[TrialResult, ...], roles: tuple[Role, ...], *made: PlateCorrection) -> tuple[Fit, ...]:

@@ -27,25 +27,21 @@ _DIFFERENT = "plates and motion differ by more than a wrong body can make of it,
 
 
 def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[TrialWindow, ...]:
-    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's
-    time; static trials belong to that time only where they are asked for, rows of postures never.
-    """
+    """Return trials of some roles with motion and contact, each at its place in time; no rows of postures."""
     asked = [one for one in results if one.trial.role != "static" or "static" in roles]
-    moving = [one for one in asked if one.motion is not None and not of_postures(one.motion.time)]
-    seconds = [float(np.ptp(one.motion.time[[0, -1]])) for one in moving if one.motion is not None]
+    moving = [(one, one.motion) for one in asked if one.motion is not None and not of_postures(one.motion.time)]
+    seconds = [float(np.ptp(motion.time[[0, -1]])) for _, motion in moving]
+    # from 0 to 1 through all trials in turn: what drifts in a session goes on from one to the next
     ends = np.cumsum(seconds)
-    found = []
-    for one, long, end in zip(moving, seconds, ends, strict=True):
-        if one.comparison is None or one.motion is None or one.trial.role not in roles or not one.comparison.used.any():
-            continue
-        found.append(TrialWindow(one.trial, one.motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]))
-    return tuple(found)
+    return tuple(
+        TrialWindow(one.trial, motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1])
+        for (one, motion), long, end in zip(moving, seconds, ends, strict=True)
+        if one.comparison is not None and one.trial.role in roles and one.comparison.used.any()
+    )
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
-    """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are
-    short.
-    """
+    """Return the trials to look at: to fit, else kept, and where they are short quiet standing beside them."""
     roles = FITTED_ROLES if windows(results, FITTED_ROLES) else KEPT_ROLES
     moving = windows(results, roles)
     names = {window.trial.name for window in moving}
@@ -69,9 +65,7 @@ def recorded_of(result: SessionResult) -> Recorded:
 
 
 def failed_checks(result: SessionResult) -> tuple[QualityCheck, ...]:
-    """Return the checks of the recordings (units, signs, labels, clocks) that failed; trials without plates are looked
-    at by their markers alone.
-    """
+    """Return the failed checks of the recordings; trials without plates are seen by their markers alone."""
     measured = tuple(window for window in all_windows(result.trials) if window.trial.plates)
     checks = check_quality(Recorded(result.session, cases_of(result.body, measured)))
     return tuple(quality for quality in checks if not quality.ok)
@@ -87,31 +81,29 @@ def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
 
 def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
     """Return by name why a trial is not looked at, though it should be."""
-    seen = {window.trial.name: window.seconds for window in windows(results, ("static", *FITTED_ROLES))}
-    wanted = [one for one in results if one.trial.role in FITTED_ROLES and not seen.get(one.name, 0.0)]
-    still = {one.name for one in wanted if one.motion is not None and of_postures(one.motion.time)}
-    why = {one.name: _POSTURES if one.name in still else " ".join(one.reasons) for one in wanted}
-    return {one.name: TOO_SHORT if one.name in seen else why[one.name] for one in wanted}
+    seen, why = {window.trial.name: window.seconds for window in windows(results, ("static", *FITTED_ROLES))}, {}
+    for one in (one for one in results if one.trial.role in FITTED_ROLES and not seen.get(one.name, 0.0)):
+        postures = one.motion is not None and of_postures(one.motion.time)
+        why[one.name] = TOO_SHORT if one.name in seen else _POSTURES if postures else " ".join(one.reasons)
+    return why
 
 
 def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, ...]:
-    """Return for every trial and refused file of a session how many seconds of it are judged (of those ``looked_at``),
-    or why it is not, and what every gate took out of it.
-    """
+    """Return by trial and refused file how many seconds are judged of those ``looked_at``, or why none."""
     why = reasons_left_out(result.trials)
     roles = {one.trial.role for one in result.trials if one.name in looked_at}
     rows = []
     for one in result.trials:
-        name, role = one.trial.name, one.trial.role
+        name, role, missed = one.trial.name, one.trial.role, False
         if name in looked_at:
-            rows.append(Judged(name, one.compared_s, left_out=one.left_out))
+            reason = ""
         elif "fit" in roles and role not in ("fit", "static"):
-            rows.append(Judged(name, 0.0, _KEPT, left_out=one.left_out))
+            reason = _KEPT
         elif role == "static" and roles:
-            rows.append(Judged(name, 0.0, _STATIC, left_out=one.left_out))
+            reason = _STATIC
         else:
-            reason = why.get(name) or " ".join(one.reasons) or _no_frame(one)
-            rows.append(Judged(name, 0.0, reason, missed=True, left_out=one.left_out))
+            reason, missed = why.get(name) or " ".join(one.reasons) or _no_frame(one), True
+        rows.append(Judged(name, one.compared_s if name in looked_at else 0.0, reason, missed, one.left_out))
     return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
 
 

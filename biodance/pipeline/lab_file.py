@@ -1,6 +1,4 @@
-"""The file of a laboratory, lab.toml: its accepted corrections, its own tolerances, the bands of its people; and what
-it may say, with the range of every number: nothing else of a stranger's file is believed.
-"""
+"""lab.toml: accepted corrections, tolerances, bands of people; nothing out of range is believed of a stranger's."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,17 +27,20 @@ PLUG_IN_GAIT = "normal_plug_in_gait"
 
 
 @dataclass(frozen=True, eq=False)
-class LabFile:
-    """What a lab.toml says: ``corrections`` of the plates, ``tolerances`` of the laboratory's own or None, and the
-    ``normal`` bands of its people, those of plug-in gait's angles ``beside``, and what the gait deviation index is told
-    against, or None.
-    """
+class HealthyReference:
+    """Bands (``normal``; plug-in gait's ``beside``), and ``deviation`` of the index, None if too few tell it."""
 
-    corrections: tuple[PlateCorrection, ...] = ()
-    tolerances: Tolerances | None = None
     normal: tuple[NormalCurve, ...] = ()
     beside: tuple[NormalCurve, ...] = ()
     deviation: DeviationReference | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class LabFile(HealthyReference):
+    """What a lab.toml says: ``corrections`` of the plates, own ``tolerances`` or None, and the reference."""
+
+    corrections: tuple[PlateCorrection, ...] = ()
+    tolerances: Tolerances | None = None
 
     def corrected(self, session: Session) -> Session:
         """Return a session as read, corrected."""
@@ -50,12 +51,8 @@ NO_LAB = LabFile()
 
 
 def read_lab(path: str | Path | None) -> LabFile:
-    """Return what the file of a laboratory says; nothing without a file.
-
-    Raises
-    ------
-    FileRefused
-        It cannot be read, or says what cannot be corrected.
+    """Return what the file of a laboratory says; nothing without a file. Raises FileRefused: it cannot be read, or says
+    what cannot be corrected.
     """
     if path is None:
         return NO_LAB
@@ -70,15 +67,13 @@ def read_lab(path: str | Path | None) -> LabFile:
         known, where = replace(tolerances_of(raw), norms=norms) if raw else None, "normal"
         normal, where = normal_of(whole.get("normal", {})), PLUG_IN_GAIT
         beside, where = normal_of(whole.get(PLUG_IN_GAIT, {})), "gait_deviation_index"
-        return LabFile(corrections, known, normal, beside, deviation_of(whole.get("gait_deviation_index")))
+        return LabFile(normal, beside, deviation_of(whole.get("gait_deviation_index")), corrections, known)
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
         raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
 
 
 def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrection, ...]) -> str:
-    """Return the lab.toml that holds what was corrected ``earlier`` and what lasts of what was ``accepted``; "" for
-    nothing.
-    """
+    """Return the lab.toml of ``earlier`` corrections and of those ``accepted`` that last; "" for nothing."""
     lasting = tuple(one for one in accepted if one.fault.lasting)
     return corrections_text(joined_corrections(earlier, lasting))
 

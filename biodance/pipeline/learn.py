@@ -1,6 +1,4 @@
-"""A laboratory learns from its own sessions without fault how large everything is that is no fault, and its healthy
-reference: bands over its people, and what the gait deviation index is told against.
-"""
+"""What a laboratory learns from sessions without fault: how large is no fault, and its healthy reference."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,8 +11,6 @@ from biodance.cycles.curves import CurveGroup
 from biodance.cycles.movement import EMG
 from biodance.cycles.scores import (
     FEATURES,
-    DeviationReference,
-    NormalCurve,
     deviation_reference,
     gait_vectors,
     normal_curves,
@@ -38,6 +34,7 @@ from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_in
 from biodance.pipeline.judged_trials import cases_of, chosen_windows
+from biodance.pipeline.lab_file import HealthyReference
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.results import SessionResult
@@ -63,17 +60,6 @@ class MeasuredWalk:
     vectors: dict[str, Array]
 
 
-@dataclass(frozen=True, eq=False)
-class HealthyReference:
-    """``normal`` bands, those of plug-in gait's own angles ``beside``, and ``deviation`` of the gait deviation index,
-    None where too few people or strides tell it.
-    """
-
-    normal: tuple[NormalCurve, ...] = ()
-    beside: tuple[NormalCurve, ...] = ()
-    deviation: DeviationReference | None = None
-
-
 def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
     """Return how the person of an examined ``session`` moved; without EMG, whose size hangs on skin and electrodes."""
     moved = session_movement(result)
@@ -87,9 +73,7 @@ def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
 
 
 def healthy_reference(healthy: Sequence[MeasuredWalk], everybody: Sequence[MeasuredWalk]) -> HealthyReference:
-    """Return the reference of ``healthy`` people; ``everybody`` who was measured, patients too, gives the features of
-    the deviation index. A person counts once, over all sessions.
-    """
+    """Return the reference of ``healthy`` people; patients among ``everybody`` help to find features."""
     people, beside = dict[str, list[CurveGroup]](), dict[str, list[CurveGroup]]()
     legs: dict[tuple[str, str], list[Array]] = {}
     for one in healthy:
@@ -98,6 +82,7 @@ def healthy_reference(healthy: Sequence[MeasuredWalk], everybody: Sequence[Measu
         for side, rows in one.vectors.items():
             legs.setdefault((one.person, side), []).extend(rows)
     strides = [row for one in everybody for rows in one.vectors.values() for row in rows]
+    # as many features (singular vectors) as that cannot be found in fewer strides
     enough = len(strides) >= FEATURES and len(legs) >= _FEWEST_LEGS
     means = [np.mean(rows, axis=0) for rows in legs.values()]
     deviation = deviation_reference(np.stack(strides), np.stack(means)) if enough else None
@@ -125,27 +110,10 @@ class LearnedSession:
 
 @dataclass(frozen=True, eq=False)
 class LearnedLaboratory:
-    """What a laboratory learned from its own sessions.
-
-    Parameters
-    ----------
-    archive : pathlib.Path
-        Its folder.
-    created : str
-        UTC time, ISO 8601.
-    tolerances : Tolerances or None
-        For `diagnose`; None where too few sessions are without fault.
-    norms : tuple of Norm
-        What is usual of instruments, people and witnesses.
-    sessions : tuple of str
-        That it rests on.
-    shown : mapping
-        Key of a size -> how many coefficients the sessions show of it; 0 = as shipped.
-    left_out : mapping
-        Session -> why nothing was learned from it.
-    healthy : HealthyReference
-        Bands of joint angles, moments and powers over its people, none for fewer than three; and what the gait
-        deviation index is told against.
+    """What a laboratory learned from the ``sessions`` of its ``archive``, at a UTC time (``created``, ISO 8601):
+    ``tolerances`` for `diagnose` (None: too few sessions are without fault), ``norms`` of instruments, people and
+    witnesses, by size how many coefficients were ``shown`` (0 = as shipped), by session why it was ``left_out``, and
+    the ``healthy`` reference, without bands for fewer than three people.
     """
 
     archive: Path
@@ -162,9 +130,6 @@ class LearnedLaboratory:
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), None, tuple(f"{name}: {why}" for name, why in self.left_out.items()))
-
-
-_BESIDE = "recordings beside the session folders belong to none of them and are left out"
 
 
 def learn_laboratory(
@@ -216,7 +181,8 @@ def learn_laboratory(
     if not sessions:
         sessions = [folder]
     elif recordings_in(folder):
-        tell(f"{folder.resolve().name}: {_BESIDE}")
+        beside = "recordings beside the session folders belong to none of them and are left out"
+        tell(f"{folder.resolve().name}: {beside}")
     if len(sessions) < FEWEST:
         held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
         raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")
@@ -250,9 +216,8 @@ def learned_session(result: SessionResult) -> LearnedSession:
     windows, session = chosen_windows(result.trials), result.session
     if result.body is None or not windows:
         raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
-    if failed := [
-        quality for quality in check_quality(Recorded(session, cases_of(result.body, windows))) if not quality.ok
-    ]:
+    checks = check_quality(Recorded(session, cases_of(result.body, windows)))
+    if failed := [quality for quality in checks if not quality.ok]:
         raise SessionRefused(
             f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
         )
@@ -261,25 +226,17 @@ def learned_session(result: SessionResult) -> LearnedSession:
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     own = noise_of_instruments(session.trials, soft_tissue(windows), skin_of(result.body, windows))
-    seen = [SeenValue("camera_noise", name, own.camera, "m"), SeenValue("plate_noise_fz", name, own.plate[2], "N/rtHz")]
-    if result.standing is not None:
-        seen += _standing(result, name)
+    seen = [
+        SeenValue("camera_noise", name, own.camera, "m"),
+        SeenValue("plate_noise_fz", name, own.plate[2], "N/rtHz"),
+    ]
+    if (one := result.standing) is not None:
+        seen.append(SeenValue("standing sway", name, sway(one.cop), "m"))
+        for side, size in (("ahead", one.com_ahead), ("left", one.com_left)) if one.com.size else ():
+            seen.append(SeenValue(f"standing centre of mass {side} of pressure", name, size, "m"))
+        if "mass" not in session.subject.guessed:
+            seen.append(SeenValue("plates less declared mass", name, one.mass - mass, "kg"))
     return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)))
-
-
-def _standing(result: SessionResult, name: str) -> list[SeenValue]:
-    """Return how the person of a session stands."""
-    one = result.standing
-    assert one is not None
-    found = [SeenValue("standing sway", name, sway(one.cop), "m")]
-    if one.com.size:
-        found += [
-            SeenValue("standing centre of mass ahead of pressure", name, one.com_ahead, "m"),
-            SeenValue("standing centre of mass left of pressure", name, one.com_left, "m"),
-        ]
-    if "mass" not in result.session.subject.guessed:
-        found.append(SeenValue("plates less declared mass", name, one.mass - result.session.subject.mass, "kg"))
-    return found
 
 
 def learned_together(
@@ -288,18 +245,14 @@ def learned_together(
     left_out: Mapping[str, str],
     healthy: HealthyReference = NO_REFERENCE,
 ) -> LearnedLaboratory:
-    """Return what the sessions teach together, beside the ``healthy`` reference.
-
-    Raises
-    ------
-    SessionRefused
-        Fewer than three sessions, and no band of healthy people.
+    """Return what the sessions teach together, beside the ``healthy`` reference. Raises SessionRefused: fewer than
+    three sessions, and no band of healthy people.
     """
     names, seen = tuple(one.name for one in sessions), norms([row for one in sessions for row in one.seen])
+    if len(sessions) < FEWEST and healthy.normal:
+        return LearnedLaboratory(archive, now(), None, seen, names, {}, dict(left_out), healthy)
     if len(sessions) < FEWEST:
         why = " ".join(f"{name}: {reason}" for name, reason in list(left_out.items())[:FEWEST])
-        if healthy.normal:
-            return LearnedLaboratory(archive, now(), None, seen, names, {}, dict(left_out), healthy)
         raise SessionRefused(
             f"{archive}: {len(sessions)} of {len(sessions) + len(left_out)} sessions can be learned from, at least "
             f"{FEWEST} are needed. {why}"

@@ -5,8 +5,10 @@ house runs forwards and backwards over the last second, so that its middle is as
 cut into steps that different frames do, so that no frame waits for all of it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import time as clock
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +24,27 @@ from biodance.diagnosis.watch import (
     said_of_markers,
     silent_plates,
 )
-from biodance.errors import TrialRefused
+from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability
 from biodance.identification.recursive import RecursivePosterior, initial_posterior, summed_pressure
 from biodance.identification.statistics import Fit, believable
+from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import at_marker_times, force_filter, motion_filter
+from biodance.lab.readers import read_trial
+from biodance.lab.session.read import read_session
 from biodance.motion.contact import Contact, contact_with_plates, feet_on_ground
 from biodance.motion.dynamics import regressor
 from biodance.motion.ik.inverse_kinematics import Follower
 from biodance.motion.soles import soles_from_body
 from biodance.motion.track import smooth, upright_trunk
-from biodance.pipeline.asked import asked_words
+from biodance.pipeline.body import body_of
+from biodance.pipeline.still import asked_words
+from biodance.pipeline.trial import prepare_trial
+from biodance.pipeline.trial_result import Step
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
+from biodance.threads import one_thread
 from biodance.uncertainty.caution import widened_prior
 
 _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
@@ -48,9 +57,7 @@ _SLOW = 10.0
 
 @dataclass(frozen=True, eq=False)
 class LiveState:
-    """What an operator sees: ``time`` s, ``verdicts`` segment -> how well its mass is known, ``suspect`` what is
-    wrong now, in words, ``advice`` what to do next, and ``asked`` the segment that it is about ("" none).
-    """
+    """At ``time`` s: ``verdicts`` by segment, what is ``suspect``, ``advice`` to do, and the segment ``asked``."""
 
     time: float
     verdicts: Mapping[str, Knowability]
@@ -61,22 +68,9 @@ class LiveState:
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """The end of a stream.
-
-    Parameters
-    ----------
-    fit : Fit or None
-        All frames as they were used; None where none came so far.
-    identification : Identification or None
-        From these frames; None with ``cause`` why.
-    cause : str
-        Why nothing was identified; empty otherwise.
-    warnings : tuple of LiveWarning
-        What was noticed on the way, in time.
-    frame_s, wall_s : array_like
-        (T,) s that each frame took: of processor time, and by the clock.
-    state : LiveState
-        What is known, suspect and to be done at the end.
+    """The end of a stream: the frames as used (``fit``, None without any), what they identify or the ``cause`` why not,
+    ``warnings`` in time, s that each frame took of the processor (``frame_s``) and by the clock (``wall_s``), (T,)
+    each, and the last ``state``.
     """
 
     fit: Fit | None
@@ -121,15 +115,11 @@ class LiveSession:
         self.posterior: RecursivePosterior = initial_posterior(widened_prior(body.sip))
         self._weight = -float(body.gravity[2] * body.sip.mass.sum())
         self._watch = StreamWatch(trial, self._follower, weight=self._weight)
-        self._warm_up()
-
-    def _warm_up(self) -> None:
-        """Load what the first window would wait for, by believing a body that stands in its neutral posture."""
-        time = np.arange(self._hop) / self.markers.rate
-        q, still = np.tile(self.body.neutral, (time.size, 1)), np.zeros((2, time.size, self.body.nv))
-        part = Motion(time, q, *still)
-        W = regressor(self.body, part)
-        self._believed(part, Wrench(time, np.asarray(W @ self.body.sip.phi)), np.ones(time.size, dtype=bool))
+        # Load what the first window would wait for, by believing a body that stands in its neutral posture.
+        time = np.arange(self._hop) / rate
+        part = Motion(time, np.tile(body.neutral, (time.size, 1)), *np.zeros((2, time.size, body.nv)))
+        stood = Wrench(time, np.asarray(regressor(body, part) @ body.sip.phi))
+        self._believed(part, stood, np.ones(time.size, dtype=bool))
 
     @property
     def warnings(self) -> tuple[LiveWarning, ...]:
@@ -138,15 +128,14 @@ class LiveSession:
 
     @property
     def _standing_point(self) -> Array:
-        """(3,) m, mean centre of pressure of the loaded frames so far; before them the middle of all plates."""
+        """(3,) m, mean centre of pressure so far; before any load the middle of all plates."""
         if self._pressure[3]:
             return np.asarray(self._pressure[:3] / self._pressure[3])
         return np.asarray(np.mean([plate.centre for plate in self.trial.plates], axis=0))
 
     @property
     def _now(self) -> float:
-        """s, time of the last frame that came."""
-        return float(self.markers.time[max(len(self._q) - 1, 0)])
+        return float(self.markers.time[max(len(self._q) - 1, 0)])  # s, of the last frame that came
 
     def push(self) -> tuple[LiveWarning, ...]:
         """Take in the next frame and return what it gave reason to warn of."""
@@ -173,23 +162,22 @@ class LiveSession:
         """Take in what the filter still held back, and return all that was found."""
         for _ in self._work or ():
             pass
-        count, found = len(self._q), None
-        if self._done < count:
-            for _ in self._take(count, count):
-                pass
-        fit = self._fit()
-        if fit is None or not fit.use.any():
-            cause = "No frame had all its ground contact measured by the plates: nothing can be identified."
-            return LiveResult(fit, None, cause, self.warnings, frame_s, wall_s, self.state())
-        try:
-            found = identify_body(self.body, (fit,))
-            cause = found.cause
-        except TrialRefused as refused:
-            cause = str(refused)
+        count = len(self._q)
+        for _ in self._take(count, count) if self._done < count else ():
+            pass
+        fit, found = self._fit(), None
+        cause = "No frame had all its ground contact measured by the plates: nothing can be identified."
+        if fit is not None and fit.use.any():
+            try:
+                found = identify_body(self.body, (fit,))
+                cause = found.cause
+            except TrialRefused as refused:
+                cause = str(refused)
         return LiveResult(fit, found, cause, self.warnings, frame_s, wall_s, self.state())
 
     def _take(self, stop: int, until: int) -> Iterator[None]:
         """Do the work of the window that ends before frame ``stop`` for the frames not yet done before ``until``."""
+        # a whole window, or further back where frames wait: the filter needs `_DELAY` of settled frames before them
         start = max(0, min(stop - self._window, self._done - self._delay))
         cut = slice(start, stop)
         q = upright_trunk(self.body, np.array(self._q[cut]), self.markers.rate)
@@ -217,6 +205,7 @@ class LiveSession:
         for plate in self.trial.plates:
             at = plate.wrench.time
             step = 0.5 * float(at[1] - at[0]) if at.size > 1 else 0.0
+            # half a sample further at both ends: clocks of plates and markers are rounded differently
             pick = slice(*np.searchsorted(at, [time[0] - step, time[-1] + step]))
             plates.append(replace(plate, wrench=Wrench(at[pick], plate.wrench.value[pick])))
         return replace(self.trial, markers=markers, plates=tuple(plates))
@@ -226,15 +215,8 @@ class LiveSession:
     ) -> Iterator[None]:
         """Watch the wrench of the frames ``new`` of the window and let those that are sound tell of the body."""
         cut = slice(start + new.start, start + new.stop)
-        part = Motion(
-            motion.time[new],
-            motion.q[new],
-            motion.v[new],
-            motion.a[new],
-            np.array(self._distance[cut]),
-            self._follower.names,
-            joint_names=motion.joint_names,
-        )
+        distance, names = np.array(self._distance[cut]), self._follower.names
+        part = replace(motion.at(new), residual=distance, marker_names=names, joint_names=motion.joint_names)
         wrench = Wrench(part.time, filtered.wrench.value[new])
         W = regressor(self.body, part)
         measured = contact.measured[new] & np.array(self._determined[cut]) & np.isfinite(wrench.value).all(axis=1)
@@ -245,13 +227,10 @@ class LiveSession:
             point, seen = self._standing_point, (W[use], wrench.value[use])
             self._watch.look_at_wrench(self._now, *seen, self.posterior, point=point, step=self._hop)
         yield
-        self._learn(Fit("stream", part, wrench, use & (not self._watch.suspect), self.trial.settings.outlier), W)
-
-    def _learn(self, fit: Fit, W: Array) -> None:
-        """Let the used frames of a window tell of the body; ``W`` (T, 6, p) is their regressor."""
-        if fit.use.any():
+        fit = Fit("stream", part, wrench, use & (not self._watch.suspect), self.trial.settings.outlier)
+        if fit.use.any():  # the last used frame stands for all of the window: errors last longer than it
             last = int(np.flatnonzero(fit.use)[-1])
-            variance = _SLOW * self._watch.noise(self.posterior)
+            variance = _SLOW * self._watch.wrench.noise(self.posterior)
             self.posterior = self.posterior.updated(W[last], fit.wrench.value[last], variance)
         self._pressure = self._pressure + summed_pressure(fit)
         self._taken.append(fit)
@@ -268,12 +247,11 @@ class LiveSession:
         """Return what to do next, and the segment that becomes better known by it."""
         if self._watch.suspect:
             return "Mend what is suspect first: frames do not count until then.", ""
-        rows = np.diag(self.posterior.covariance)[::10] / np.maximum(
-            np.diag(self.posterior.prior.covariance)[::10], 1e-12
-        )
-        names = self.posterior.prior.segments
+        # share of the prior's variance that is left of every mass, the tenth parameter each
+        before, now = (np.diag(one)[::10] for one in (self.posterior.prior.covariance, self.posterior.covariance))
+        names, left = self.posterior.prior.segments, now / np.maximum(before, 1e-12)
         standing = {names[foot.segment] for foot in self.body.feet.values()}
-        open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
+        open_ = [i for i in np.argsort(-left) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:
             return "All masses but those of the feet are known well enough: the session can end.", ""
         return asked_words(names[open_[0]]), names[open_[0]]
@@ -301,7 +279,7 @@ class StreamWatch:
     def __init__(self, trial: Trial, follower: Follower, *, weight: float) -> None:
         self.trial, self._follower, self._weight = trial, follower, weight
         self._markers = MarkerWatch(np.zeros(len(follower.names)))
-        self._wrench = WrenchWatch(weight)
+        self.wrench = WrenchWatch(weight)
         self._sound = follower.q
         self._point: Array | None = None
         self._suspect: dict[str, LiveWarning] = {}
@@ -313,9 +291,7 @@ class StreamWatch:
         return tuple(said.text for said in self._suspect.values())
 
     def look_at_markers(self, now: float, xyz: Array, distances: Array) -> None:
-        """Look at the ``distances`` (n, K) m between markers and body of the last quarter of a second; ``xyz`` (K, 3) m
-        the markers of the last frame.
-        """
+        """Look at ``distances`` (n, K) m of markers to the body, and the last frame ``xyz`` (K, 3) m."""
         off = self._markers.look(distances)
         if not off.any():
             self._sound = self._follower.q
@@ -323,26 +299,19 @@ class StreamWatch:
             return
         if "markers" in self._suspect or np.isnan(self._sound).any():
             return
+        # the five markers furthest from the body, of which two may have changed names
         last = np.nan_to_num(distances[-1])
         worst = [self._follower.names[i] for i in np.argsort(-last)[:5] if last[i] > 0]
         self._warn("markers", said_of_markers(now, worst, self._follower.exchange(xyz, worst, self._sound)))
 
     def look_at_plates(
-        self,
-        now: float,
-        raw: Trial,
-        plates: Sequence[Plate],
-        on_plate: NDArray[np.bool_],
-        *,
-        until: int,
+        self, now: float, raw: Trial, plates: Sequence[Plate], on_plate: NDArray[np.bool_], *, until: int
     ) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it: channels ``raw`` and as
         filtered in ``plates``, feet ``on_plate`` (T, 2, P); frames from ``until`` on are not settled yet.
         """
-        silent = {
-            f"silent {said.target}": said
-            for said in silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
-        }
+        fell = silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
+        silent = {f"silent {said.target}": said for said in fell}
         count = max(3, round(_EMPTY * plates[0].wrench.rate))
         late = slice(max(0, until - count), until)
         gone = {said.target for said in self.warnings if said.effect == "plate_gone"}
@@ -370,22 +339,151 @@ class StreamWatch:
         if any(key != "wrench" for key in self._suspect):
             return
         self._point = point if self._point is None else self._point
+        # each column of W is the wrench of one parameter (kg, kg·m, kg·m²): it moves to the point as a wrench does
         turned = np.swapaxes(wrench_about_point(np.swapaxes(W, 1, 2), self._point), 1, 2)
         moved, found = wrench_about_point(wrench, self._point), None
         for first in range(0, len(W), step):
             cut = slice(first, first + step)
-            found = self._wrench.look(turned[cut], moved[cut], posterior)
+            found = self.wrench.look(turned[cut], moved[cut], posterior)
         if found is None:
             self._suspect.pop("wrench", None)
         elif "wrench" not in self._suspect:
             self._warn("wrench", said_of_jump(now, self.trial.plates, self._point, *found))
-
-    def noise(self, posterior: RecursivePosterior) -> Array:
-        """Return the variance (6,) of the wrench about the ``posterior``, as seen so far."""
-        return self._wrench.noise(posterior)
 
     def _warn(self, key: str, said: LiveWarning) -> None:
         known = {(w.effect, w.target) for w in self.warnings}
         self._suspect[key] = said
         if (said.effect, said.target) not in known:
             self.warnings.append(said)
+
+
+@one_thread()
+def body_and_stream(
+    file: Path,
+    *,
+    static: Path | None = None,
+    subject: str | None = None,
+    markers: str | None = None,
+    settings: Mapping[str, object] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> tuple[Body, Trial]:
+    """Return the body that moves in a recording, scaled on its ``static`` (by default that of its folder), and the
+    recording with the markers of its set alone.
+
+    Raises
+    ------
+    SessionRefused
+        The recording is not there or was not read, or no static trial scales the body; the message says why.
+    """
+    if not file.is_file():
+        what = "is a folder" if file.is_dir() else "there is no such file"
+        raise SessionRefused(f"{file}: {what}. Give one recording of a session's folder.")
+    session = read_session(file.parent, subject_name=subject, markers=markers, settings=settings, tell=tell)
+    trial = next((one for one in session.trials if one.source.path.resolve() == file.resolve()), None)
+    if trial is None:
+        why = session.refused.get(file.name, "session.toml says skip, or it is no recording.")
+        raise SessionRefused(f"{file}: cannot be streamed. {why}")
+    worn = read_marker_set(markers or trial.marker_set) if markers or trial.marker_set else None
+    statics = session.of_role("static")
+    if static is not None:
+        statics = (
+            replace(read_trial(static, role="static", subject=subject, markers=worn), settings=session.settings),
+        )
+    if trial.markers is None:
+        raise SessionRefused(
+            f"{file}: has no markers, so no body can follow it. Give a recording of markers and plates."
+        )
+    if worn is None:
+        raise SessionRefused(f"{file}: has no markers of a known set, so no body can follow it. Say --markers.")
+    if not statics:  # a stream has no later to look at for a better body
+        raise SessionRefused(
+            f"{file}: its folder has no static trial, so nobody knows who moves. Give one with --static FILE."
+        )
+    steps: list[Step] = []
+    body, _ = body_of(session.subject, tuple(map(prepare_trial, statics)), statics[0].settings, steps)
+    if body is None or not any(step.name == "scale" and step.status == "done" for step in steps):
+        why = " ".join(step.text for step in steps if step.status != "done" and step.name in ("subject", "scale"))
+        raise SessionRefused(f"{file}: no body can be scaled for it. {why}")
+    return body, replace(trial, markers=canonical(trial.markers, worn))
+
+
+def stream_recording(
+    file: Path | str,
+    *,
+    static: Path | str | None = None,
+    subject: str | None = None,
+    markers: str | None = None,
+    tell: Callable[[LiveState], None] = lambda _: None,
+) -> LiveResult:
+    """Take a recording in frame by frame, as a laboratory would send it: track, watch for faults, identify.
+
+    Parameters
+    ----------
+    file : path
+        A recording with markers and force plates.
+    static : path, optional
+        The static trial; by default that of the folder in which the file lies.
+    subject : str, optional
+        The person, where C3D files hold several.
+    markers : str, optional
+        Marker set, where the file does not tell.
+    tell : callable, optional
+        Called with the `LiveState` after every second of the recording.
+
+    Returns
+    -------
+    LiveResult
+        What the stream told, and how long every frame took.
+
+    Raises
+    ------
+    SessionRefused
+        The recording is not there or was not read, or no static trial scales the body.
+    TrialRefused
+        The recording has no plates, or its first frame does not show the posture.
+
+    Examples
+    --------
+    >>> streamed = biodance.stream_recording("visit/squat_1.c3d")
+    >>> streamed.warnings
+    ()
+    """
+    body, trial = body_and_stream(Path(file), static=Path(static) if static else None, subject=subject, markers=markers)
+    return replay(body, trial, tell=tell)
+
+
+@one_thread()
+def replay(
+    body: Body,
+    trial: Trial,
+    *,
+    real_time: bool = False,
+    tell: Callable[[LiveState], None] = lambda _: None,
+    warn: Callable[[LiveWarning], None] = lambda _: None,
+) -> LiveResult:
+    """Return what a stream of the frames of ``trial`` (of which only its own set's markers are kept) tells of ``body``.
+
+    ``real_time`` waits for the rate of the recording; ``tell`` is called once a second of the recording, ``warn`` as
+    soon as something is noticed.
+
+    Raises
+    ------
+    TrialRefused
+        The trial has no plates, or its first frame does not show the posture.
+    """
+    if trial.markers is None or not trial.plates:
+        raise TrialRefused(f"Trial {trial.name}: a stream needs markers and force plates, and one of them is missing.")
+    session, count = LiveSession(body, trial), trial.markers.time.size
+    spent, wall = np.zeros(count), np.zeros(count)
+    started, second = clock.perf_counter(), max(1, round(trial.markers.rate))
+    for frame in range(count):
+        if real_time:
+            clock.sleep(max(0.0, started + frame / trial.markers.rate - clock.perf_counter()))
+        began, mine = clock.perf_counter(), clock.thread_time()
+        found = session.push()
+        spent[frame], wall[frame] = clock.thread_time() - mine, clock.perf_counter() - began
+        for said in found:
+            warn(said)
+        if frame % second == second - 1:
+            tell(session.state())
+    return session.finish(spent, wall)

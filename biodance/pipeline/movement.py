@@ -111,11 +111,9 @@ class SessionMovement:
         """
         import pandas as pd
 
-        parts = []
-        for one in self.trials:
-            part = one.table()
+        parts = [one.table() for one in self.trials]
+        for one, part in zip(self.trials, parts, strict=True):
             part.insert(0, "trial", one.trial)
-            parts.append(part)
         some = [part for part in parts if len(part)] or parts[:1]
         return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=["trial"])
 

@@ -10,14 +10,7 @@ from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.session.archive import (
-    IndexedTrial,
-    archive_folders,
-    iso_date,
-    read_index,
-    read_plate_text,
-    visit_date,
-)
+from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
 from biodance.lab.session.read import read_session
 from biodance.records import Trial
 
@@ -29,20 +22,9 @@ _Tell = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class PlatesJudged:
-    """The plates of a laboratory over all its visits.
-
-    Parameters
-    ----------
-    archive : pathlib.Path
-        Its folder.
-    judgement : ArchiveJudgement
-        Cards of the plates, changes, kinds of trial, people who stand out.
-    observations : tuple of PlateEvidence
-        What every trial says of every plate.
-    refused : mapping
-        Session or recording -> why it was left out.
-    notes : tuple of str
-        What was guessed.
+    """The plates of a laboratory over all visits of its ``archive``: the ``judgement`` (cards of the plates, changes,
+    kinds of trial, people who stand out), ``observations`` of every plate in every trial, by session or recording why
+    it was ``refused``, and ``notes`` on what was guessed.
     """
 
     archive: Path
@@ -130,16 +112,12 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     tell("judging the plates")
     named = plainly_named(observations)
     judged = judge_archive(named)
-    undated = [visit.name for visit in judged.visits if not visit.date]
-    notes = (
-        (
-            f"{len(undated)} of {len(judged.visits)} visits have no date: all are in the order of their names. Write "
-            f"[session] date into session.toml.",
-        )
-        if undated
-        else ()
+    undated = sum(not visit.date for visit in judged.visits)
+    note = (
+        f"{undated} of {len(judged.visits)} visits have no date: all are in the order of their names. Write "
+        f"[session] date into session.toml."
     )
-    return PlatesJudged(folder, judged, named, refused, notes)
+    return PlatesJudged(folder, judged, named, refused, (note,) if undated else ())
 
 
 def told_failure(why: Exception) -> str:
@@ -176,23 +154,13 @@ def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     found: list[PlateEvidence] = []
     for name in dict.fromkeys(row.visit for row in rows):
         own = [row for row in rows if row.visit == name]
-        trials, conditions = _plate_trials(own, refused)
+        trials, conditions = list[Trial](), dict[str, Mapping[str, str]]()
+        for row in own:
+            try:
+                trials.append(read_plate_text(row.path))
+                conditions[trials[-1].name] = row.conditions
+            except BiodanceError as why:
+                refused[row.path.name] = str(why)
         visit = PlateVisit(name, own[0].person, iso_date(own[0].date))
         found += plate_evidence(trials, visit, mass=own[0].mass, conditions=conditions)
     return found
-
-
-def _plate_trials(
-    rows: list[IndexedTrial], refused: dict[str, str]
-) -> tuple[list[Trial], dict[str, Mapping[str, str]]]:
-    """Return the recordings of a visit that can be read, and the conditions of each."""
-    trials: list[Trial] = []
-    conditions: dict[str, Mapping[str, str]] = {}
-    for row in rows:
-        try:
-            trials.append(read_plate_text(row.path))
-        except BiodanceError as why:
-            refused[row.path.name] = str(why)
-            continue
-        conditions[trials[-1].name] = row.conditions
-    return trials, conditions

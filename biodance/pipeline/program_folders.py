@@ -36,7 +36,7 @@ from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, Motion, Plate, Session, Trial, Wrench, longest_run, runs
+from biodance.records import CHANNELS, Motion, Session, Trial, Wrench, longest_run, runs
 from biodance.version import __version__
 
 _DERIVED = "derivatives/biodance"
@@ -61,15 +61,25 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
         raise TrialRefused(f"{session.folder}: no trial has markers, so there is nothing to share as motion.")
     _refuse_alike({trial.name: bids_label(trial.name) for trial in raw}, folder)
     subject = bids_label(session.subject.name or session.folder.name)
+    moved = [found for found in trials if found.motion is not None]
+    one = session.subject
+    said = {"sex": one.sex, "age": one.age, "height_m": one.stature, "mass_kg": one.mass}
+    column = {"sex": "sex", "stature": "height_m", "mass": "mass_kg"}
+    unknown = dict.fromkeys(column[what] for what in one.guessed)
     with whole_folder(folder) as part:
-        _write_bids(session, raw, [found for found in trials if found.motion is not None], body, part, subject)
-    return tuple(found.name for found in trials if found.motion is not None)
+        place, derived = (made_folder(part / below / f"sub-{subject}" / "motion") for below in (".", _DERIVED))
+        write_description(part, session.folder.name)
+        write_description(part / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
+        write_participants(part, [{"participant_id": f"sub-{subject}", **said, **unknown}])
+        for trial in raw:
+            _recorded(trial, place, subject)
+        for found in moved:
+            _found(found, body, derived, subject)
+    return tuple(found.name for found in moved)
 
 
 def _refuse_alike(names: Mapping[str, str], folder: Path) -> None:
-    """Raise SessionRefused where two trials (name -> what it is called there) would be written to one file, also on a
-    disk that takes no notice of capitals.
-    """
+    """Raise SessionRefused where two trials (name -> file) would share a file, capitals not told apart."""
     seen: dict[str, str] = {}
     for trial, name in names.items():
         if (other := seen.setdefault(name.lower(), trial)) != trial:
@@ -77,23 +87,6 @@ def _refuse_alike(names: Mapping[str, str], folder: Path) -> None:
                 f"{folder}: the trials {other} and {trial} would both be called {name} there; nothing was written. "
                 f"Rename one, or choose with --trial."
             )
-
-
-def _write_bids(
-    session: Session, raw: Sequence[Trial], moved: Sequence[TrialResult], body: Body, folder: Path, subject: str
-) -> None:
-    place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", _DERIVED))
-    write_description(folder, session.folder.name)
-    write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
-    one = session.subject
-    said = {"sex": one.sex, "age": one.age, "height_m": one.stature, "mass_kg": one.mass}
-    guessed = {"sex": "sex", "stature": "height_m", "mass": "mass_kg"}
-    unknown = dict.fromkeys((guessed[what] for what in one.guessed), None)
-    write_participants(folder, [{"participant_id": f"sub-{subject}", **said, **unknown}])
-    for trial in raw:
-        _recorded(trial, place, subject)
-    for found in moved:
-        _found(found, body, derived, subject)
 
 
 def _stem(subject: str, trial: str, system: str = _SYSTEM) -> str:
@@ -110,19 +103,15 @@ def _recorded(trial: Trial, place: Path, subject: str) -> None:
     if trial.plates:
         plates = [{"Name": plate.name, "Corners_m": plate.corners.tolist()} for plate in trial.plates]
         told = about | {"TrackingSystemName": "forceplates", "Plates": plates}
-        stem = _stem(subject, trial.name, "forceplates")
-        write_motion(place, stem, _wrenches(trial.plates), task=bids_label(trial.name), about=told)
-
-
-def _wrenches(plates: tuple[Plate, ...]) -> BidsChannels:
-    """Return the ground's wrench on the subject, about the lab origin, of every plate."""
-    units = ("N",) * 3 + ("N m",) * 3
-    rows = [
-        (f"{plate.name}_{channel}", channel[1], "MISC", plate.name, unit, "lab")
-        for plate in plates
-        for channel, unit in zip(CHANNELS, units, strict=True)
-    ]
-    return BidsChannels(plates[0].wrench.time, np.hstack([plate.wrench.value for plate in plates]), rows)
+        stem, units = _stem(subject, trial.name, "forceplates"), ("N",) * 3 + ("N m",) * 3
+        rows = [  # the ground's wrench on the subject, about the lab origin, of every plate
+            (f"{plate.name}_{channel}", channel[1], "MISC", plate.name, unit, "lab")
+            for plate in trial.plates
+            for channel, unit in zip(CHANNELS, units, strict=True)
+        ]
+        values = np.hstack([plate.wrench.value for plate in trial.plates])
+        wrenches = BidsChannels(trial.plates[0].wrench.time, values, rows)
+        write_motion(place, stem, wrenches, task=bids_label(trial.name), about=told)
 
 
 def _found(one: TrialResult, body: Body, place: Path, subject: str) -> None:
@@ -130,16 +119,15 @@ def _found(one: TrialResult, body: Body, place: Path, subject: str) -> None:
     task, stem = bids_label(one.name), _stem(subject, one.name)
     about = {"TrackingSystemName": _SYSTEM, "Description": "joint angles and centre of mass of a tracked body"}
     about["Missing"] = " ".join(state_notes(one.motion)) or "none"
-    write_motion(place, f"{stem}_desc-joints", _joints(body, one.motion), task=task, about=about)
-    events = [(e.time, f"{e.side}_{'strike' if e.down else 'off'}") for e in movement_of(one, body, None).events]
-    write_events(place, f"{stem}_desc-feet", events)
-
-
-def _joints(body: Body, motion: Motion) -> BidsChannels:
-    known = np.where(motion.determined[:, None], 1.0, np.nan)
+    # angles in deg and centre of mass in m; empty where the markers do not determine the posture
+    known = np.where(one.motion.determined[:, None], 1.0, np.nan)
     rows = [(joint.name, "n/a", "JNTANG", joint.name, "deg", "joint") for joint in body.joints]
     rows += [(f"centre_of_mass_{axis}", axis, "POS", "centre_of_mass", "m", "lab") for axis in COMPONENTS]
-    return BidsChannels(motion.time, np.hstack([motion.known_angles, known * centre_of_mass(body, motion)]), rows)
+    values = np.hstack([one.motion.known_angles, known * centre_of_mass(body, one.motion)])
+    joints = BidsChannels(one.motion.time, values, rows)
+    write_motion(place, f"{stem}_desc-joints", joints, task=task, about=about)
+    events = [(e.time, f"{e.side}_{'strike' if e.down else 'off'}") for e in movement_of(one, body, None).events]
+    write_events(place, f"{stem}_desc-feet", events)
 
 
 def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
@@ -160,6 +148,7 @@ def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
     angles = motion.q[:, body.nq - len(names) :]
     if not body.n_root:
         return TimeTable(body.name, tuple(names), motion.time, angles)
+    # ground axes x, y up, z right instead of x, y left, z up: R' = U'R, and places p' = U'p (rows: p U)
     turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
     turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
     root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
@@ -187,9 +176,7 @@ _SHORTEST = 10
 
 @dataclass(frozen=True)
 class OpensimTrial:
-    """What was written of one trial: ``files`` by name; ``dynamics`` the span (s) in which the plates measure all, None
-    where they never do; ``why_not`` in words.
-    """
+    """A trial's ``files``; ``dynamics`` from and to s, where plates measure all, or None and ``why_not``."""
 
     trial: str
     files: tuple[str, ...]
@@ -239,7 +226,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files = [write_mot(folder / f"{name}.mot", table, notes=notes).name]
     if one.trial.markers is not None:
         files.insert(0, write_trc(folder / f"{name}.trc", one.trial.markers).name)
-    contact = contact_of(one.trial, one, body)
+    contact = contact_of(one, body)
     if contact is None:
         return OpensimTrial(name, tuple(files), None, "It has no force plate.")
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
@@ -250,10 +237,9 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files.append(write_whole(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
     # The longest run of frames in which plates and markers tell all; None where it is too short.
     first, stop = longest_run(contact.measured & motion.determined)
-    span = slice(first, stop) if stop - first >= _SHORTEST else None
-    if span is None:
+    if stop - first < _SHORTEST:
         return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
-    between = (float(motion.time[span.start]), float(motion.time[span.stop - 1]))
+    span, between = slice(first, stop), (float(motion.time[first]), float(motion.time[stop - 1]))
     setup = inverse_dynamics_setup(
         name,
         model=MODEL,
@@ -263,15 +249,11 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
         out=f"{name}_opensim_torques.sto",
     )
     files.append(write_whole(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
-    files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
-    return OpensimTrial(name, tuple(files), between)
-
-
-def _torques(body: Body, motion: Motion, ground: dict[str, Wrench], span: slice, name: str) -> TimeTable:
-    """Return our torques in OpenSim's names, N·m."""
     try:
-        found = joint_torques(body, motion, ground)
+        torque = joint_torques(body, motion, ground).torque[span]
     except BiodanceError as why:
         raise TrialRefused(f"Trial {name}: {why}") from why
-    columns = tuple(f"{joint.name}_moment" for joint in body.joints)
-    return TimeTable(f"{name} torques of biodance", columns, motion.time[span], found.torque[span])
+    columns = tuple(f"{joint.name}_moment" for joint in body.joints)  # in OpenSim's names, N·m
+    torques = TimeTable(f"{name} torques of biodance", columns, motion.time[span], torque)
+    files.append(write_mot(folder / f"{name}_torques.sto", torques).name)
+    return OpensimTrial(name, tuple(files), between)

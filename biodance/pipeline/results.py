@@ -49,11 +49,6 @@ class Placed:
     shown: ShownJoints
     steps: tuple[Step, ...]
 
-    def holds(self, other: "tuple[Subject, Body | None, tuple[Mask, ...]]") -> bool:
-        """Return whether another subject, known body and hidden frames are those of this one."""
-        subject, known, hidden = other
-        return subject == self.subject and known is self.known and all(map(np.array_equal, hidden, self.hidden))
-
 
 @dataclass(frozen=True, eq=False)
 class SessionResult:
@@ -220,9 +215,7 @@ class SessionResult:
 
 @dataclass(frozen=True, eq=False)
 class MendedCopy:
-    """A session ``result`` with faults of its recordings undone in a copy: the pairs of labels ``exchanged`` by trial,
-    with their frames, and the ``checks`` that name these and all other faults.
-    """
+    """A session ``result`` with faults undone in a copy: labels ``exchanged``, and ``checks`` that name all."""
 
     result: SessionResult
     exchanged: Mapping[str, Mapping[Pair, Spans]]

@@ -1,6 +1,4 @@
-"""From a robot's recording and its URDF file to what its links weigh, with every doubt about the recording in a
-sentence.
-"""
+"""From a robot's recording and its URDF file to what its links weigh, with every doubt in a sentence."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +8,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.urdf import read_urdf
-from biodance.diagnosis.robot import RobotCause, RobotFinding, robot_causes
+from biodance.diagnosis.robot import RobotFinding, robot_causes
 from biodance.display import cause_in_words
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_gain import PlateGain
@@ -38,16 +36,6 @@ _APART = 1.0
 """s: clocks further apart are said first."""
 
 
-def of_file(notes: tuple[str, ...]) -> list[Attention]:
-    """Return what was made of the robot's file."""
-    return [Attention("warn" if note.startswith("Mended") else "note", note, "", "drawing") for note in notes]
-
-
-def refusals(refused: dict[str, str]) -> list[Attention]:
-    """Return why trials were left out."""
-    return [Attention("warn", why, name, "trial") for name, why in refused.items()]
-
-
 def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
     """Return what a person should know of the recordings: clocks, plates, encoders, what contradicts the drawing."""
     out = []
@@ -72,7 +60,7 @@ def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
 def cause_words(causes: tuple[RobotFinding, ...], *, doubtful: bool = False) -> list[Attention]:
     """Return what is not as drawn; ``doubtful`` where the motion kept is not predicted better without the causes."""
     if doubtful:
-        names = ", ".join(_named(one.cause) for one in causes)
+        names = ", ".join(f"{cause_in_words(one.cause.kind)} of {one.cause.where}" for one in causes)
         text = (
             f"Something is not as drawn that resembles {names}; without it the motion kept is not predicted better, so "
             f"nothing is named and nothing was taken out."
@@ -80,15 +68,11 @@ def cause_words(causes: tuple[RobotFinding, ...], *, doubtful: bool = False) -> 
         return [Attention("warn", text, "", "drawing")]
     out = []
     for one in causes:
-        others = " or ".join(_named(rival) for rival in one.rivals[:3])
+        others = " or ".join(f"{cause_in_words(rival.kind)} of {rival.where}" for rival in one.rivals[:3])
         more = f" The recording does not tell it from: {others}." if others else ""
         text = f"{_finding_sentence(one)} It was taken out before the masses were identified.{more}"
         out.append(Attention("warn", text, "", one.cause.kind))
     return out
-
-
-def _named(cause: RobotCause) -> str:
-    return f"{cause_in_words(cause.kind)} of {cause.where}"
 
 
 def _finding_sentence(one: RobotFinding) -> str:
@@ -112,7 +96,8 @@ def _finding_sentence(one: RobotFinding) -> str:
         case PlateCrosstalk.name:
             return f"The plate's crosstalk from {where} is {100 * value:.1f} ± {100 * reach:.1f} %."
         case _:
-            return f"The {_named(one.cause)} is {value:.3g} ± {reach:.2g} {one.cause.unit}."
+            name = f"{cause_in_words(one.cause.kind)} of {where}"
+            return f"The {name} is {value:.3g} ± {reach:.2g} {one.cause.unit}."
 
 
 def misweighed(found: SessionIdentification) -> list[Attention]:
@@ -120,12 +105,11 @@ def misweighed(found: SessionIdentification) -> list[Attention]:
     out = []
     for one in found.validations or found.fitted:
         seen, needed = (float(np.mean(wrench.value[one.use, 2])) for wrench in (one.measured, one.identified))
-        if abs(seen - needed) > _MISWEIGHED * needed:
-            text = (
-                f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
-                f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
-            )
-            out.append(Attention("warn", text, one.name, "plate"))
+        text = (
+            f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
+            f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
+        )
+        out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > _MISWEIGHED * needed)
     return out
 
 
@@ -134,7 +118,7 @@ def weights(done: Identification) -> list[Attention]:
     if done.status == "failed":
         return [Attention("fail", done.cause, "", "identification")]
     total = np.zeros(done.sip.phi.size)
-    total[::10] = 1.0
+    total[::10] = 1.0  # picks the masses: their sum is total'phi, its variance total'C total
     drawn, mass = float(done.body.sip.mass.sum()), float(done.sip.mass.sum())
     reach = SIGMAS * float(np.sqrt(total @ done.sip.covariance @ total))
     out = []
@@ -249,11 +233,13 @@ def identify_robot(
     best, named = (plain, ()) if doubtful else (best, causes)
     wrong = misweighed(best[0])
     words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best[0].identification))
-    said = strongest_first([*of_file(body.notes), *refusals(refused), *attention_of(trials), *words])
+    of_file = [Attention("warn" if n.startswith("Mended") else "note", n, "", "drawing") for n in body.notes]
+    lost = [Attention("warn", why, name, "trial") for name, why in refused.items()]
+    said = strongest_first([*of_file, *lost, *attention_of(trials), *words])
     judged = tuple(Judged(one.recorded.name, float(one.fit.use.sum()) / RATE) for one in trials)
-    lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
+    missed = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     verdict = "named" if named else "unexplained" if doubtful or wrong else "clean"
-    return RobotResult(found, Path(urdf), body, tuple(trials), *best, named, said, (*judged, *lost), verdict)
+    return RobotResult(found, Path(urdf), body, tuple(trials), *best, named, said, (*judged, *missed), verdict)
 
 
 _Found = tuple[SessionIdentification, BaseEstimate, dict[str, tuple[Agreement, Agreement]]]
@@ -269,9 +255,7 @@ def _identified(body: Body, name: str, fitted: Sequence[MatchedTrial], kept: Seq
 
 
 def _residual_rms(one: SessionIdentification) -> float:
-    """Return what is left of the kept motions: mean logarithm, over all channels, of the RMS of what is slower than
-    `_SLOW`, where causes show.
-    """
+    """Return what is left of kept motions below `_SLOW`, where causes show: mean logarithm of the RMS."""
     rms = []
     for trial in one.validations or one.fitted:
         slow = low_pass(trial.measured.value - trial.identified.value, trial.measured.rate, LowPass(cutoff=_SLOW))
@@ -287,16 +271,13 @@ def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], li
         return fitted, kept
     first, last = [], []
     for one in fitted:
+        # cut where the last share of what may be used begins, not of all that was recorded
         use = np.flatnonzero(one.fit.use)
         cut = use[int((1 - _KEPT) * use.size)] if use.size else 0
         early = np.arange(one.fit.use.size) < cut
-        first.append(_limited(one, one.fit.use & early))
-        last.append(_limited(one, one.fit.use & ~early))
+        first.append(replace(one, fit=replace(one.fit, use=one.fit.use & early)))
+        last.append(replace(one, fit=replace(one.fit, use=one.fit.use & ~early)))
     return first, last
-
-
-def _limited(one: MatchedTrial, use: "np.ndarray") -> MatchedTrial:
-    return replace(one, fit=replace(one.fit, use=use))
 
 
 def _validated(
@@ -324,8 +305,7 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
         needed = predict_wrench(body, motion)
         fit = fit_plate(needed, Wrench(motion.time, measured), one.grounded.use, within=_NEAR)
         predicted.append(onto_plate(needed.value, fit))
-    point = Wrench(motion.time, measured).cop()[use]
-    about = np.nanmean(point, axis=0)
+    about = np.nanmean(Wrench(motion.time, measured).cop()[use], axis=0)
     truth, table, found = (Wrench(motion.time, wrench_about_point(value, about)) for value in (measured, *predicted))
     return TrialValidation(
         one.recorded.name, about, truth, table, found, use, compare(truth, table, use), compare(truth, found, use)
@@ -333,16 +313,16 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
 
 
 def _in_root(one: MatchedTrial, seen: TrialValidation) -> tuple[Agreement, Agreement]:
-    """Return how well drawing and identified robot agree with a trial's wrench in the axes and about the origin of the
-    robot's root, as the paper compares: there gravity turns with the robot, and all channels move.
-    """
+    """Return both agreements in the axes of the robot's root, as the paper compares: there all channels move."""
     q = one.fit.motion.q
     on_plate = elementary_rotation("z", one.plate.yaw)
     turn = on_plate @ quaternion_matrix(q[:, 3:7])
+    # from the root, as it stands on the plate, to the point that the moments are about
     arm = seen.about - [*one.plate.place, 0.0] - q[:, :3] @ on_plate.T
 
     def turned(wrench: Wrench) -> Wrench:
         force, moment = wrench.value[:, :3], wrench.value[:, 3:]
+        # M about the root = M about the point + arm x F
         moment = moment + cross(arm, force)
         both = [np.einsum("tji,tj->ti", turn, part) for part in (force, moment)]
         return Wrench(wrench.time, np.concatenate(both, axis=1))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from biodance.motion.grounded import (
     UNDER,
     BaseSeen,
     Grounded,
-    Lean,
     PlateFit,
     base_of_inclinations,
     base_of_markers,
@@ -49,9 +49,7 @@ _SLOW = LowPass(cutoff=0.2 * _COARSE)
 
 @dataclass(frozen=True, eq=False)
 class MatchedTrial(RobotMotion):
-    """One trial with plate and encoders brought together: as ``recorded``, ``plate`` when and where, ``innovation`` of
-    the drawing at it.
-    """
+    """A trial as ``recorded``, ``plate`` when and where, ``innovation`` of the drawing at it."""
 
     recorded: RobotTrial
     plate: PlateFit
@@ -117,40 +115,20 @@ _Placed = tuple[Grounded, PlateFit]
 """A motion and its place on the plate."""
 
 
-def _placed(
-    body: Body,
-    time: Array,
-    angle: Array,
-    measured: Wrench,
-    *,
-    under: float = UNDER[0],
-    lean: Lean = None,
-    settings: LowPass | None = None,
-    base: BaseSeen | None = None,
-) -> _Placed:
-    """Return the motion with the standing feet of `ground`, and its place on the plate."""
-    found = ground(body, time, angle, settings=settings, lean=lean, base=base, under=under)
+def _placed(body: Body, time: Array, angle: Array, measured: Wrench, **how: Any) -> _Placed:
+    """Return the motion as `ground` finds it (standing feet, filter and base as it takes them), and its plate."""
+    found = ground(body, time, angle, **how)
     return found, fit_plate(predict_wrench(body, found.motion), measured, found.use)
 
 
-def _grounded_motion(
-    body: Body,
-    time: Array,
-    angle: Array,
-    measured: Wrench,
-    *,
-    settings: LowPass | None = None,
-    base: BaseSeen | None = None,
-) -> _Placed:
-    """Return the motion and its place on the plate; where the angles leave open which foot stands, the one that stood
-    before, or the same one always: what agrees best with the plate.
-    """
-    placed = partial(_placed, body, time, angle, measured, settings=settings, base=base)
+def _grounded_motion(body: Body, time: Array, angle: Array, measured: Wrench, **how: Any) -> _Placed:
+    """Return the motion and its plate; where angles leave open which foot stands, what agrees best with it."""
+    placed = partial(_placed, body, time, angle, measured, **how)
     usual = placed()
     if not usual[0].unclear.any():
         return usual
     others = (placed(under=UNDER[1]), *(placed(lean=np.full(time.size, side)) for side in (0, 1)))
-    return max((usual, *others), key=_agreement)
+    return max((usual, *others), key=lambda one: one[1].correlation)
 
 
 def _stood_by_plate(body: Body, time: Array, angle: Array, measured: Wrench, base: BaseSeen | None) -> _Placed:
@@ -165,9 +143,9 @@ def _stood_by_plate(body: Body, time: Array, angle: Array, measured: Wrench, bas
         lean = _best_lean(partial(coarse, under=under), side)
         fine = np.repeat(lean, step)[: time.size]
         found.append(_placed(body, time, angle, measured, under=under, lean=fine, base=base))
-        if _agreement(found[-1]) >= _FAITHFUL:
+        if found[-1][1].correlation >= _FAITHFUL:
             break
-    return max(found, key=_agreement)
+    return max(found, key=lambda one: one[1].correlation)
 
 
 def _best_lean(placed: Callable[..., _Placed], side: int) -> NDArray[np.intp]:
@@ -175,20 +153,16 @@ def _best_lean(placed: Callable[..., _Placed], side: int) -> NDArray[np.intp]:
     unclear = placed(lean=None)[0].unclear
     starts = [start for start, stop in runs(binary_closing(unclear, iterations=round(_PARTED * _COARSE)))]
     lean, before = np.full(unclear.size, side), -1.0
-    agreed = _agreement(placed(lean=lean))
+    agreed = placed(lean=lean)[1].correlation
     while _FAITHFUL > agreed > before:
         before = agreed
         for start, stop in pairwise([*starts, unclear.size]):
             for foot, end in product((0, 1), {stop, unclear.size}):
                 other = lean.copy()
                 other[start:end] = foot
-                if (size := _agreement(placed(lean=other))) > agreed:
+                if (size := placed(lean=other)[1].correlation) > agreed:
                     lean, agreed = other, size
     return lean
-
-
-def _agreement(one: _Placed) -> float:
-    return one[1].correlation
 
 
 def _base_from_imu(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
@@ -206,9 +180,7 @@ def _base_from_imu(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen 
 def _base_from_markers(
     body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, angle: Array, fit: PlateFit
 ) -> Grounded:
-    """Return the motion with the base where its markers are, in the frame of the first standing sole; only frames with
-    all markers count.
-    """
+    """Return the motion with its base where its markers are; only frames with all of them count."""
     if one.markers is None:
         raise FileRefused(f"{one.files[1]}: holds no markers, which recording.toml [base] markers names.")
     time, seen = found.motion.time, one.markers
@@ -252,9 +224,7 @@ def _coarse(time: Array, angle: Array, measured: Wrench) -> tuple[Array, Array, 
 
 
 def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tuple[str, str]) -> bool:
-    """Whether the wrench follows, most of the time, once two joints are exchanged back: a few seconds of another motion
-    can resemble a path.
-    """
+    """Whether most of the wrench follows with two joints exchanged back: a few seconds may resemble a path."""
     names = [joint.name for joint in body.joints]
     i, j = (names.index(name) for name in pair)
     other = angle.copy()

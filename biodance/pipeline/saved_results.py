@@ -1,6 +1,4 @@
-"""What a results folder keeps so that nothing is computed twice, the body and the motions of the trials, and so that it
-can be made again: the software, the files and the settings.
-"""
+"""What a results folder keeps: body and motions, and software, files and settings to make it all again."""
 
 import json
 import os
@@ -23,11 +21,9 @@ from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session, visit_words
 from biodance.lab.session.results_folder import doubt_about, read_manifest, refuse_mixture
 from biodance.library import refuse_large
-from biodance.motion.contact import ground_contact
-from biodance.motion.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
-from biodance.pipeline.trial_result import Step, TrialResult
+from biodance.pipeline.trial import attempt, compare_wrenches, contact_of, prepare_trial
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Motion, Session, Trial
 from biodance.records.motion import BY_FRAME
 from biodance.settings import Value
@@ -63,44 +59,30 @@ def now() -> str:
     return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _version(library: str) -> str:
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return "not installed"
-
-
 def blas() -> str:
-    """Return which BLAS numpy runs on: the library and version it was built with, and the kernels of all that are
-    loaded by now, where that can be asked.
-    """
-    import numpy as np
+    """Return which BLAS numpy was built with, and the kernels of all that are loaded, where that can be asked."""
+    from threadpoolctl import threadpool_info
 
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     said = f"{built.get('name', _UNKNOWN)} {built.get('version', '')}".strip()
-    return " ".join([said, *_kernels()])
-
-
-def _kernels() -> list[str]:
-    """Return the kernel and the number of threads of every BLAS in this process."""
-    from threadpoolctl import threadpool_info
-
-    found = [one for one in threadpool_info() if one.get("user_api") == "blas"]
-    return sorted({f"({one.get('architecture', _UNKNOWN)}, threads: {one['num_threads']})" for one in found})
+    loaded = [one for one in threadpool_info() if one.get("user_api") == "blas"]
+    kernels = {f"({one.get('architecture', _UNKNOWN)}, threads: {one['num_threads']})" for one in loaded}
+    return " ".join([said, *sorted(kernels)])
 
 
 def provenance(result: SessionResult, *, created: str) -> Provenance:
     """Collect the provenance of ``result``; ``created`` is the UTC time to write into it (see `now`)."""
-    versions = {
-        "biodance": __version__,
-        "python": platform.python_version(),
-        **{name: _version(name) for name in LIBRARIES},
-    }
+    versions = {"biodance": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
     inputs, folder = {}, result.session.folder
     for source in (trial.trial.source for trial in result.trials):
         inside = source.path.is_relative_to(folder)
         inputs[source.path.relative_to(folder).as_posix() if inside else source.path.name] = source.sha256
-    visit = visit_words(result.session.folder, [trial.name for trial in result.trials])
+    visit = visit_words(folder, [trial.name for trial in result.trials])
     return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict(), visit)
 
 
@@ -153,20 +135,14 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
 
 def kept_body(folder: Path) -> Path:
     """Return the file with the body of a results folder, which may itself be that file; it need not exist."""
-    return (
-        folder
-        if folder.is_file()
-        else next((folder / name for name in (BODY_FILE, SCALED) if (folder / name).is_file()), folder / BODY_FILE)
-    )
+    if folder.is_file():
+        return folder
+    return next((folder / name for name in (BODY_FILE, SCALED) if (folder / name).is_file()), folder / BODY_FILE)
 
 
 def read_kept_body(folder: Path) -> tuple[Body, str]:
-    """Return the body of a results folder, or of a body.json, and where it comes from in words.
-
-    Raises
-    ------
-    FileRefused
-        The file is no body, or not the one that the run of the folder wrote.
+    """Return the body of a results folder, or of a body.json, and where it comes from in words. Raises FileRefused: the
+    file is no body, or not the one that the run of the folder wrote.
     """
     if folder.is_dir():
         refuse_mixture(folder, (BODY_FILE, SCALED))
@@ -174,21 +150,15 @@ def read_kept_body(folder: Path) -> tuple[Body, str]:
 
 
 def known_body(body: Body | str | Path | None) -> Body | None:
-    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one.
-
-    Raises
-    ------
-    FileRefused
-        The file is no body.
+    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one. Raises
+    FileRefused: the file is no body.
     """
     if body is None or isinstance(body, Body):
         return body
     path = Path(body)
-    return (
-        read_kept_body(path)[0]
-        if (path / BODY_FILE).is_file()
-        else read_body(path / BODY_FILE if path.is_dir() else path)[0]
-    )
+    if (path / BODY_FILE).is_file():
+        return read_kept_body(path)[0]
+    return read_body(path / BODY_FILE if path.is_dir() else path)[0]
 
 
 def read_kept(folder: Path) -> KeptResults:
@@ -225,9 +195,7 @@ def read_kept(folder: Path) -> KeptResults:
 
 
 def doubt_told(folder: Path, written: Path, said: str) -> tuple[Path, str]:
-    """Return a file ``written`` from a results folder and what is ``said`` of it, with the files of the folder that are
-    not as their run wrote them: beside those that were read, which would have been refused.
-    """
+    """Return what was ``written`` and is ``said``, with files of its folder that are not as their run left them."""
     doubt = doubt_about(folder)
     return written, f"{said} What is exported is of its run, but look: {doubt}" if doubt else said
 
@@ -271,19 +239,16 @@ def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
             f"Trial {name}: {trial.source.path} has changed since the results were made. Run the session again."
         )
     filtered = replace(trial, settings=trial.settings.changed({"filter.cutoff": kept.cutoffs[name]}))
-    ready, motion, steps = prepare_trial(filtered), kept.motions[name], list[Step]()
+    ready, motion = prepare_trial(filtered), kept.motions[name]
+    # the same recording, filtered alike, sums to the same wrench unless its plates were corrected
     if not np.allclose(_load(ready.trial), kept.loads[name], rtol=1e-6, atol=1e-3):
         raise TrialRefused(
             f"Trial {name}: its plates were corrected when the results were made (a lab.toml). Give the session folder."
         )
     one = TrialResult(ready.trial, ready.steps, motion=motion)
-    if not ready.trial.plates:
-        return one
-    soles = soles_from_body(kept.body, motion)
-    mass = float(kept.body.sip.mass.sum())
-    contact = attempt(steps, "contact", lambda: ground_contact(ready.trial, soles, mass=mass))
+    contact = contact_of(one, kept.body)
     if contact is None:
         return one
     return replace(
-        one, comparison=attempt(steps, "compare", lambda: compare_wrenches(ready.trial, kept.body, motion, contact))
+        one, comparison=attempt([], "compare", lambda: compare_wrenches(ready.trial, kept.body, motion, contact))
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import repeat
 
 import numpy as np
@@ -33,7 +32,7 @@ from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
-from biodance.records import Mask, Session
+from biodance.records import Markers, Session
 from biodance.threads import one_thread
 
 
@@ -46,15 +45,6 @@ def _stop(what: str) -> Step:
     return Step("stop", "refused", f"Not done: the run was stopped by Ctrl-C before {what}.")
 
 
-def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[TrialResult, ...]:
-    """Return the trials prepared, static ones first."""
-    read = []
-    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
-        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
-        read.append(prepare_trial(trial))
-    return tuple(read)
-
-
 def _examined(
     read: tuple[TrialResult, ...],
     body: Body | None,
@@ -62,9 +52,7 @@ def _examined(
     earlier: tuple[TrialResult | None, ...],
     tell: Callable[[str], None],
 ) -> tuple[TrialResult, ...]:
-    """Return the trials tracked, where the same markers were not followed ``earlier``, and compared, with their checks;
-    those that Ctrl-C left undone say so.
-    """
+    """Return the trials tracked (unless ``earlier``) and compared, with checks; those Ctrl-C left undone say so."""
     results: list[TrialResult] = []
     try:
         for k, (one, before) in enumerate(zip(read, earlier, strict=True), 1):
@@ -82,17 +70,22 @@ def _placed(
     earlier: tuple[Placed, tuple[TrialResult, ...]] | None,
 ) -> Placed:
     """Return who moves in the prepared trials ``read`` of a session; the body of an ``earlier`` examination where its
-    trials have the same markers, and nothing else carries in other frames.
-
-    Raises
-    ------
-    SessionRefused
-        The ``known`` body is of another person.
+    trials have the same markers, and nothing else carries in other frames. SessionRefused where the ``known`` body is
+    of another person.
     """
     subject = session.subject
-    hidden = tuple(_hidden(one, subject.mass) for one in read)
-    if earlier is not None and earlier[0].holds((subject, known, hidden)) and _same_markers(read, earlier[1]):
-        return earlier[0]
+    hidden = tuple(  # frames of each trial in which something else carries, so that they place no joint
+        carried_elsewhere(one.trial, weight=one.trial.settings.gravity * subject.mass)
+        if one.usable and one.trial.markers is not None and one.trial.plates
+        else np.zeros(0, dtype=bool)
+        for one in read
+    )
+    if earlier is not None:
+        before, trials = earlier
+        # scaling and joints rest on markers, person and hidden frames alone: equal ones give an equal body
+        same = before.subject == subject and before.known is known and all(map(np.array_equal, hidden, before.hidden))
+        if same and _same_markers(read, trials):
+            return before
     steps: list[Step] = []
     body, source = body_of(subject, read, session.settings, steps)
     prior = None
@@ -107,25 +100,15 @@ def _placed(
     return Placed(subject, known, hidden, body, plain, source, prior, shown, tuple(steps))
 
 
-def _hidden(one: TrialResult, mass: float) -> Mask:
-    trial = one.trial
-    if not one.usable or trial.markers is None or not trial.plates:
-        return np.zeros(0, dtype=bool)
-    return carried_elsewhere(trial, weight=trial.settings.gravity * mass)
-
-
 def _same_markers(some: tuple[TrialResult, ...], others: tuple[TrialResult, ...]) -> bool:
     """Return whether the trials of two examinations have equal markers."""
-    for one, other in zip(some, others, strict=True):
-        ours, theirs = one.trial.markers, other.trial.markers
-        if ours is None or theirs is None:
-            if ours is not theirs:
-                return False
-        elif ours.names != theirs.names or not all(
-            np.array_equal(*pair, equal_nan=True) for pair in ((ours.time, theirs.time), (ours.xyz, theirs.xyz))
-        ):
-            return False
-    return True
+
+    def same(ours: Markers | None, theirs: Markers | None) -> bool:
+        if ours is None or theirs is None or ours.names != theirs.names:
+            return ours is theirs
+        return np.array_equal(ours.time, theirs.time) and np.array_equal(ours.xyz, theirs.xyz, equal_nan=True)
+
+    return all(same(one.trial.markers, other.trial.markers) for one, other in zip(some, others, strict=True))
 
 
 def examine(
@@ -205,7 +188,11 @@ def followed(
     reference_person(session.settings.table, session.subject)
     session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
     session = with_weighed_mass(session)
-    read = _prepared(session, tell)
+    prepared = []
+    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
+        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
+        prepared.append(prepare_trial(trial))
+    read = tuple(prepared)
     tell("scaling the body")
     before = earlier.placed if earlier is not None else None
     placed = _placed(session, read, known, (before, earlier.trials) if before and earlier else None)
@@ -216,8 +203,7 @@ def followed(
     done = _examined(read, body, session.subject.mass, same, tell)
     if body is not None and placed.plain is not None:
         body, shown = with_forces(shown, placed.plain, body, done)
-    steps = list(placed.steps)
-    standing = best_standing(done)
+    steps, standing = list(placed.steps), best_standing(done)
     weighed, limits = attempt(steps, "weighing", lambda: weigh(session, standing)), session.settings.checks
     return SessionResult(
         session=session,
@@ -239,6 +225,16 @@ def followed(
     )
 
 
+def identify_result(
+    result: SessionResult, body: Body, reference: SessionIdentification | None
+) -> SessionIdentification:
+    """Identify the ``body`` of a `followed` session, beside an earlier one; see `identify_trials`."""
+    return identify_trials(
+        body, result.trials, name=result.session.folder.name, reference=reference, checks=result.checks,
+        prior=result.prior, corrections=result.corrections, weighed=result.weighed,
+    )  # fmt: skip
+
+
 @one_thread()
 def identified(
     result: SessionResult,
@@ -246,55 +242,32 @@ def identified(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Return a session that was `followed` with what its segments weigh, and its worst frames; as it is where that was
-    done before.
-    """
+    """Return a `followed` session with what its segments weigh, and its worst frames, unless it has them."""
     if result.identification is not None or any(step.name == "identify" for step in result.steps):
         return result
     body, done, steps, identification = result.body, result.trials, list(result.steps), None
     if body is not None and can_identify(done):
         tell("identifying the segments")
-        work = partial(
-            identify_trials,
-            body,
-            done,
-            name=result.session.folder.name,
-            reference=reference,
-            checks=result.checks,
-            prior=result.prior,
-            corrections=result.corrections,
-            weighed=result.weighed,
-        )
-        identification = attempt(steps, "identify", work)
-    more = _stills(body, done, identification) if body else ()
-    return replace(result, steps=tuple(steps), identification=identification, more_stills=more)
-
-
-def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:
-    """Return the worst frame of the body that is believed, and the load that was found."""
-    solved = found is not None and found.identification.status == "solved"
-    worst = worst_still(found.identification.identified if found and solved else body, done)
-    load = load_still(body, done, found.search) if found and worst else None
-    return tuple(still for still in (worst, load) if still is not None)
+        identification = attempt(steps, "identify", lambda: identify_result(result, body, reference))
+    more: tuple[Still | None, ...] = ()
+    if body is not None:  # the worst frame of the body that is believed, and the load that was found
+        solved = identification is not None and identification.identification.status == "solved"
+        worst = worst_still(identification.identification.identified if identification and solved else body, done)
+        more = (worst, load_still(body, done, identification.search) if identification and worst else None)
+    stills = tuple(still for still in more if still is not None)
+    return replace(result, steps=tuple(steps), identification=identification, more_stills=stills)
 
 
 def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding | None:
-    """Return the quiet standing of a static trial, else of a check, else the longest of all; None where nobody stands
-    still on the plates in any trial.
-    """
+    """Return the quiet standing of a static trial, else of a check, else the longest; None without any."""
     found = [(result.trial.role, result.standing) for result in results if result.standing is not None]
     order = {"static": 0, "check": 1}
+    # of one role the longest: start - end is the smallest
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end), default=("", None))[1]
 
 
 def identification_of(result: SessionResult) -> SessionIdentification:
-    """Return the identification of a session.
-
-    Raises
-    ------
-    SessionRefused
-        There is none; the message says why.
-    """
+    """Return the identification of a session. Raises SessionRefused: there is none; the message says why."""
     if result.identification is not None:
         return result.identification
     folder = result.session.folder

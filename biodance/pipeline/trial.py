@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -13,7 +14,7 @@ from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point
-from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs, read_outputs
+from biodance.lab.c3d.subject import NO_OUTPUTS, read_outputs
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.prepare import prepare
@@ -80,23 +81,21 @@ def filtered_as_it_asks(read: TrialResult, at: Followed | None, before: TrialRes
     trial = read.trial
     if at is None or not trial.marker_set or read.recorded is None:
         return trial
+    known = before.trial.settings.filter.cutoff if before is not None else "auto"
+    cutoff = None if known == "auto" else known
     if before is None or read.recorded.settings.filter.cutoff != "auto":
         cutoff = asked_cutoff(read.recorded, at)
-    else:
-        known = before.trial.settings.filter.cutoff
-        cutoff = None if known == "auto" else known
     return trial if cutoff is None else prepare(with_cutoff(read.recorded, cutoff))
 
 
 def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> MarkerFit:
-    """Return the distances (m) of a motion's markers to the model: RMS and largest per marker and of all together, and
-    the RMS of ``groups`` (marker -> group).
-    """
+    """Return the distances (m) of markers to the model, by marker, in all, and by ``groups`` (marker -> group)."""
     squares = motion.residual**2
     seen = np.isfinite(squares)
     count = seen.sum(axis=0)
     total = np.where(seen, squares, 0.0)
     rms = np.sqrt(np.divide(total.sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0))
+    # a marker that was never seen has neither; NaN, without numpy's warning of empty means
     largest = np.where(count > 0, np.where(seen, motion.residual, -np.inf).max(axis=0, initial=-np.inf), np.nan)
     overall = np.sqrt(total.sum() / count.sum()) if count.any() else np.nan
     member = np.array([(groups or {}).get(name, "") for name in motion.marker_names])
@@ -107,12 +106,8 @@ def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> Marke
 
 
 def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
-    """Return the soles of the moving body, else of the foot markers.
-
-    Raises
-    ------
-    TrialRefused
-        There is no motion, and no heel or toe marker.
+    """Return the soles of the moving body, else of the foot markers. Raises TrialRefused: there is no motion, and no
+    heel or toe marker.
     """
     if body is not None and motion is not None:
         return soles_from_body(body, motion)
@@ -124,12 +119,7 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
 
 def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
     """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured
-    frames.
-
-    Raises
-    ------
-    TrialRefused
-        No frame is fully measured; the message says why.
+    frames. Raises TrialRefused: no frame is fully measured; the message says why.
     """
     measured, simulated = trial.wrench, predict_wrench(body, motion)
     if np.nanmax(measured.force[:, 2], initial=0.0) < trial.settings.standing.force:
@@ -190,13 +180,8 @@ def examine_trial(
     groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
     fit = marker_fit(motion, groups) if motion else None
     if not trial.plates:
-        steps.append(
-            Step(
-                "wrench",
-                "refused",
-                f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with.",
-            )
-        )
+        none = f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with."
+        steps.append(Step("wrench", "refused", none))
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
         everything = np.asarray(np.isfinite(trial.wrench.value).all(axis=1))
@@ -218,6 +203,7 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
         return {}
     masks, fit = {**contact.left_out, LeftOut.POSTURE_OPEN: np.logical_not(one.motion.determined)}, trial_fit(one)
     if fit is not None:
+        # gates in their order: frames that forces contradict, then what is left in runs too short to judge
         kept = believable(body, fit, standing_point((fit,)))[0].use
         masks[LeftOut.FORCES_DIFFER] = fit.use & ~kept
         masks[LeftOut.SHORT_RUN] = kept.copy()
@@ -227,34 +213,22 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
 
 
 def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:
-    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters.
-
-    Raises
-    ------
-    TrialRefused
-        The trial gives no motion, or one too short.
+    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters. Raises
+    TrialRefused: the trial gives no motion, or one too short.
     """
     if body is None or one.motion is None:
         raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
-    contact = contact_of(one.trial, one, body)
-    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=_outputs(one.trial))
+    outputs, contact = NO_OUTPUTS, contact_of(one, body)
+    with suppress(BiodanceError):  # what else its file holds, where that can be read again
+        outputs = read_outputs(one.trial.source.path) if one.trial.source.format == "C3D" else NO_OUTPUTS
+    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=outputs)
 
 
-def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
+def contact_of(one: TrialResult, body: Body) -> Contact | None:
     """Return the ground contact of an examined trial; None without plates, or where it is refused."""
-    if one.contact is not None or not trial.plates or one.motion is None:
+    if one.contact is not None or not one.trial.plates or one.motion is None:
         return one.contact
     try:
-        return ground_contact(trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
+        return ground_contact(one.trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
     except BiodanceError:
         return None
-
-
-def _outputs(trial: Trial) -> FileOutputs:
-    """Return what else the trial's file holds; nothing where it is no C3D file or cannot be read again."""
-    if trial.source.format != "C3D":
-        return NO_OUTPUTS
-    try:
-        return read_outputs(trial.source.path)
-    except BiodanceError:
-        return NO_OUTPUTS

@@ -46,9 +46,7 @@ ON_A_FRAME = "scale on a frame"
 
 @dataclass(frozen=True, eq=False)
 class MarkerFit:
-    """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen;
-    all together in m; ``by_group`` m, RMS of legs (with the pelvis), trunk, arms and head.
-    """
+    """Distances (m) to the model: by marker ``names`` (K), NaN = never seen, in all, ``by_group`` of the body."""
 
     names: tuple[str, ...]
     rms: Array
@@ -116,9 +114,7 @@ OPEN = "posture left open"
 
 @dataclass(frozen=True)
 class Check:
-    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is
-    inside.
-    """
+    """One row of the quality table: ``value`` with its unit, the ``limit`` it is held against, whether ``inside``."""
 
     what: str
     where: str
@@ -148,9 +144,7 @@ class Weighing:
 
 @dataclass(frozen=True)
 class ForceGain:
-    """RMS difference of measured and simulated force in a ``trial``, N along x, y, z, the body ``without`` the joints
-    that the markers show and ``with_them``; masses of the table, so that no force was used for either.
-    """
+    """RMS difference (N, x y z) of forces ``without`` and ``with_them``, the joints shown, by the table's masses."""
 
     trial: str
     without: tuple[float, ...]
@@ -224,9 +218,7 @@ class TrialResult:
 
     @property
     def status(self) -> Status:
-        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look (a
-        refusal, a warning, a check outside its limit), "ok" otherwise.
-        """
+        """State: "refused" where nothing after preparing was done, "warning": a person must look, else "ok"."""
         if all(step.status != "done" or step.name == "prepare" for step in self.steps):
             return "refused"
         return "warning" if self.reasons or not all(check.inside for check in self.checks) else "ok"
@@ -276,9 +268,7 @@ class Still:
 
 
 def trial_fit(result: TrialResult, corrections: tuple[PlateCorrection, ...] = ()) -> Fit | None:
-    """Return what a trial gives to identify from or to validate on, with the doubt of the ``corrections`` that were
-    made in it; None without motion, wrench or a frame to compare.
-    """
+    """Return what a trial gives to fit, with the doubt of ``corrections`` made in it; None without any frame."""
     found, trial = result.comparison, result.trial
     if found is None or result.motion is None or not found.used.any():
         return None

@@ -1,6 +1,4 @@
-"""Two or more visits of one person side by side: cycles and masses, each quantity with its interval, and what changed
-from the first to the last beyond its uncertainty.
-"""
+"""Visits of one person side by side: each quantity with its interval, and what changed beyond its uncertainty."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +18,8 @@ from biodance.lab.session.read import read_session, visit_words
 from biodance.lab.session.recordings import ANOTHER_STATURE
 from biodance.pipeline.attention import corrected_attention, session_attention
 from biodance.pipeline.body import refuse_another_reference
-from biodance.pipeline.diagnosis import diagnosed_and_corrected
+from biodance.pipeline.diagnosis import as_diagnosed, diagnosed_and_corrected
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.load import as_diagnosed
 from biodance.pipeline.movement import SessionMovement, session_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import followed, identification_of
@@ -93,9 +90,7 @@ _About = tuple[str, str, str]
 
 
 def cycle_quantities(visits: Sequence[SessionMovement]) -> Iterator[ComparedQuantity]:
-    """Yield the key values and spatio-temporal values that the first and the last visit have in common, over all trials
-    of each.
-    """
+    """Yield the values of cycles that the first and the last visit have in common, over all their trials."""
     foot = leading_foot([[stride for trial in one for stride in trial.strides] for one in visits])
     seen = [_values(one, foot) for one in visits]
     for about in seen[0]:
@@ -114,6 +109,7 @@ def _values(moved: SessionMovement, foot: str) -> dict[_About, list[KeyValue]]:
 
 def _mean(some: Sequence[KeyValue]) -> VisitMean:
     """Return what a visit says of a quantity, with what all its cycles share."""
+    # independent of each other and the same in all cycles of a visit, so that no mean over cycles makes them smaller
     shared = float(np.hypot(placement_sd(_kind(some)), np.mean([one.sd for one in some])))
     return visit_mean(np.array([one.value for one in some]), systematic=shared)
 
@@ -144,21 +140,16 @@ BODY_KIND = "body"
 
 
 def mass_quantities(
-    visits: Sequence[tuple[SessionIdentification | None, Weighing | None]],
-    refusals: Sequence[str],
-    *,
-    tell: Callable[[str], None],
+    visits: Sequence["ExaminedVisit"], *, tell: Callable[[str], None]
 ) -> tuple[list[ComparedQuantity], list[str]]:
-    """Return the masses that the first and the last visit have in common, and why others are not compared.
-
-    ``refusals`` why a visit says nothing of the body, "" where it does. Those of the segments are what
-    `biodance.compare_sessions` returns.
+    """Return the masses that the first and the last visit have in common, those of segments as
+    `biodance.compare_sessions` has them, and why others are not compared.
     """
-    found, notes = [], [why for why in (refusals[0], refusals[-1]) if why]
-    weighed = [one for _, one in visits]
+    found, notes = [], [one.unweighed for one in (visits[0], visits[-1]) if one.unweighed]
+    weighed = [one.result.weighed for one in visits]
     if weighed[0] is not None and weighed[-1] is not None:
         found.append(_whole(weighed, weighed[0], weighed[-1]))
-    first, last = visits[0][0], visits[-1][0]
+    first, last = visits[0].identified, visits[-1].identified
     if first is None or last is None:
         return found, [f"The masses of the segments are not compared: {why}" for why in notes]
     tell("comparing the bodies")
@@ -166,18 +157,15 @@ def mass_quantities(
         changes = differences(first.identification, last.identification)
     except BiodanceError as why:
         return found, [f"The masses of the segments are not compared: {why}"]
-    masses = [_by_segment(one) for one, _ in visits]
+    known = [one.identified.identification.known if one.identified is not None else () for one in visits]
+    masses = [{row.segment: row for row in rows if row.quantity == "mass"} for rows in known]
     found += [_segment(one, [some.get(one.segment) for some in masses]) for one in changes if one.quantity == "mass"]
     return found, []
 
 
-def _by_segment(one: SessionIdentification | None) -> dict[str, Known]:
-    rows = one.identification.known if one is not None else ()
-    return {row.segment: row for row in rows if row.quantity == "mass"}
-
-
 def _whole(weighed: Sequence[Weighing | None], first: Weighing, last: Weighing) -> ComparedQuantity:
     """Return the mass that the plates carry, each visit with its own error."""
+    # two weighings err independently: variances add; p is two-sided of a normal difference
     change, sd = last.mass - first.mass, float(np.hypot(first.sd, last.sd))
     return ComparedQuantity(
         kind=BODY_KIND, quantity="total_mass", key="", side="both", unit="kg",
@@ -218,16 +206,8 @@ class ExaminedVisit:
 
 @dataclass(frozen=True, eq=False)
 class VisitComparison:
-    """What changed between visits of one person.
-
-    Parameters
-    ----------
-    visits : tuple of ExaminedVisit
-        In the order given; a change is the last less the first.
-    quantities : tuple of ComparedQuantity
-        Those that changed beyond their uncertainty first, the surest first of all.
-    notes : tuple of str
-        What is not in the intervals, and what could not be compared.
+    """What changed between ``visits`` of one person, the last less the first: ``quantities``, the surest change first,
+    and ``notes`` on what is not in the intervals and what could not be compared.
     """
 
     visits: tuple[ExaminedVisit, ...]
@@ -257,19 +237,7 @@ class VisitComparison:
 
 
 def read_visits(folders: Sequence[str | Path], *, tell: Callable[[str], None] = lambda _: None) -> tuple[Session, ...]:
-    """Return the sessions of one person's visits, as read.
-
-    Parameters
-    ----------
-    folders : sequence of str or pathlib.Path
-        Their folders, at least two, the earliest first.
-    tell : callable, optional
-        Called with what is being done, in words.
-
-    Returns
-    -------
-    tuple of Session
-        In the same order.
+    """Return the sessions of one person's visits, as read, of at least two ``folders``, the earliest first.
 
     Raises
     ------
@@ -324,20 +292,8 @@ def _refuse_another(first: Session, later: Session) -> None:
 
 
 def compare_visits(sessions: Sequence[Session], *, tell: Callable[[str], None] = lambda _: None) -> VisitComparison:
-    """Return what changed from the first to the last visit of one person.
-
-    Parameters
-    ----------
-    sessions : sequence of Session
-        Two or more visits, as `read_visits` returns them.
-    tell : callable, optional
-        Called with what is being done, in words.
-
-    Returns
-    -------
-    VisitComparison
-        Every quantity that the first and the last visit have in common: key values of angles (deg), moments (N·m/kg)
-        and powers (W/kg), spatio-temporal values, masses of the segments and of the whole body (kg).
+    """Return what changed from the first to the last visit of one person (`read_visits`), in every quantity that both
+    have: key values of angles (deg), moments (N·m/kg) and powers (W/kg), spatio-temporal values, masses (kg).
 
     Raises
     ------
@@ -351,13 +307,15 @@ def compare_visits(sessions: Sequence[Session], *, tell: Callable[[str], None] =
     uncertain in each. A quantity has changed where Benjamini and Hochberg's procedure at a false discovery rate of 5 %
     over all quantities tells it.
     """
-    names = _names(sessions)
+    names = [one.folder.resolve().name for one in sessions]
+    if len(set(names)) < len(names):  # with the folder above where two are alike
+        names = ["/".join(one.folder.resolve().parts[-2:]) for one in sessions]
     visits = tuple(_examined(one, name, tell) for one, name in zip(sessions, names, strict=True))
+    known = visits[0].result.body
     for later in visits[1:]:
-        _refuse_other_legs(visits[0], later)
-    masses, why = mass_quantities(
-        [(one.identified, one.result.weighed) for one in visits], [one.unweighed for one in visits], tell=tell
-    )
+        if known is not None and later.result.body is not None:
+            refuse_another_reference(known, later.result.body, later.result.subject.mass, names[0])
+    masses, why = mass_quantities(visits, tell=tell)
     found = [*cycle_quantities([one.moved for one in visits]), *masses]
     if not found:
         raise SessionRefused(
@@ -365,23 +323,15 @@ def compare_visits(sessions: Sequence[Session], *, tell: Callable[[str], None] =
             "Give visits with the same kind of movement."
         )
     told = beyond_chance([one.p for one in found])
+    # what changed stands first, the change of most half widths on top; the rest keeps its order
     marked = [replace(one, changed=bool(change)) for one, change in zip(found, told, strict=True)]
     ordered = sorted(marked, key=lambda one: (not one.changed, -one.distance if one.changed else 0.0))
     return VisitComparison(visits, tuple(ordered), (*why, *_notes(visits, marked)))
 
 
-def _names(sessions: Sequence[Session]) -> list[str]:
-    """Return the names of the folders, with the folder above where two are alike."""
-    own = [one.folder.resolve().name for one in sessions]
-    return own if len(set(own)) == len(own) else ["/".join(one.folder.resolve().parts[-2:]) for one in sessions]
-
-
 def _examined(session: Session, name: str, tell: Callable[[str], None]) -> ExaminedVisit:
     """Return one visit after all stages, without what its diagnosis proves to be wrong with the plates."""
-
-    def tell_visit(what: str) -> None:
-        tell(f"{name}: {what}")
-
+    tell_visit: Callable[[str], None] = lambda what: tell(f"{name}: {what}")  # noqa: E731
     result, found = diagnosed_and_corrected(followed(session, tell=tell_visit), tell=tell_visit)
     result = as_diagnosed(result, found.diagnosis) if found else result
     said = (*found.diagnosis.attention, *corrected_attention(result)) if found else session_attention(result)
@@ -402,12 +352,6 @@ def _body_told(result: SessionResult, name: str) -> tuple[SessionIdentification 
     return found, ""
 
 
-def _refuse_other_legs(first: ExaminedVisit, later: ExaminedVisit) -> None:
-    known, body = first.result.body, later.result.body
-    if known is not None and body is not None:
-        refuse_another_reference(known, body, later.result.subject.mass, first.name)
-
-
 def _notes(visits: Sequence[ExaminedVisit], found: Sequence[ComparedQuantity]) -> list[str]:
     """Return what a person should know of the intervals."""
     notes = []
@@ -419,8 +363,7 @@ def _notes(visits: Sequence[ExaminedVisit], found: Sequence[ComparedQuantity]) -
     dates = [one.date for one in visits]
     if all(dates) and dates != sorted(dates):
         notes.append("The visits are not in the order of their dates; a change is the last one given less the first.")
-    bodies = {one.moved.parameters for one in visits}
-    if len(bodies) > 1:
+    if len({one.moved.parameters for one in visits}) > 1:
         notes.append(
             "Moments and powers were computed with identified inertial parameters in one visit and the table's in "
             "another: a part of their changes may come from that."

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.consequence import LIMIT
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.display import cause_in_words, digits, listed, shown_unit, spaced
 from biodance.effects.added_mass import AddedMass
@@ -34,19 +34,18 @@ def in_words(finding: Finding) -> str:
         return name
     signs = finding.cause.words.signs if finding.cause.words else ("", "")
     sure = signs[told[0].value < 0] if any(known) else "its size is hardly known"
-    return f"{name} ({', '.join(map(_estimated, told))}{sure and f'; {sure}'})"
+    sizes = []  # each parameter with its 95 % interval: gain 6 ± 0.4 %
+    for size in told:
+        factor, unit = shown_unit(size.unit)
+        value, reach = digits(factor * size.value, 2), digits(SIGMAS * factor * size.sd, 1)
+        sizes.append(f"{spaced(size.name)} {value} ± {reach} {unit}".strip())
+    return f"{name} ({', '.join(sizes)}{sure and f'; {sure}'})"
 
 
 def _elsewhere(finding: Finding) -> str:
     """Return where else the same cause may be, to go on its place with."""
     places = [cause_in_words("", alias.target) for alias in finding.set[1:] if alias.effect == finding.effect]
     return f" or {listed(places)}" if any(places) else ""
-
-
-def _estimated(one: Estimate) -> str:
-    """Return a parameter with its 95 % interval as people say it: ``gain 6 ± 0.4 %``."""
-    factor, unit = shown_unit(one.unit)
-    return f"{spaced(one.name)} {digits(factor * one.value, 2)} ± {digits(SIGMAS * factor * one.sd, 1)} {unit}".strip()
 
 
 def cause_of(checked: str, findings: Sequence[Finding]) -> str:
@@ -57,7 +56,12 @@ def cause_of(checked: str, findings: Sequence[Finding]) -> str:
 
 def explained(cause: str) -> str:
     """Return the sentence that points from a check or a doubt to a cause (`cause_of`) that was found."""
-    return f"{cause[:1].upper()}{cause[1:]}, which was found, may explain it."
+    return f"{first_upper(cause)}, which was found, may explain it."
+
+
+def first_upper(text: str) -> str:
+    """Return ``text`` with a capital first letter and nothing else changed."""
+    return text[:1].upper() + text[1:]
 
 
 _SHORT = 8
@@ -110,10 +114,15 @@ def names_markers(finding: Finding) -> bool:
 
 
 def alternatives(finding: Finding) -> list[str]:
-    """Return what else a finding may be, each once, in plain words: another place of the same cause, or another
-    cause.
-    """
-    named = [_alternative(alias, alias.effect == finding.effect) for alias in finding.set[1:]]
+    """Return what else a finding may be, each once, in plain words: the same cause elsewhere, or another cause."""
+    named = []
+    for alias in finding.set[1:]:
+        if alias.effect == finding.effect:
+            whole, _, channel = alias.target.rpartition(":")
+            named.append(place_in_words(whole if whole and channel in "xyz" else alias.target))
+        else:
+            known = alias.cause.words
+            named.append(known.alternative if known else f"a {spaced(alias.effect)}")
     return list(filter(None, dict.fromkeys(named)))
 
 
@@ -125,12 +134,8 @@ def place_in_words(target: str) -> str:
     if plate:
         name = re.sub(r"(\D)(\d)", r"\1 \2", plate, count=1)
         return f"{channel} of {name}" if channel else name
-    return (
-        channel.replace("forearm_hand", "forearm")
-        .replace("trunk_head", "trunk")
-        .replace("_", " ")
-        .replace("/", " and ")
-    )
+    plain = channel.replace("forearm_hand", "forearm").replace("trunk_head", "trunk")
+    return plain.replace("_", " ").replace("/", " and ")
 
 
 class _Size(NamedTuple):
@@ -140,9 +145,7 @@ class _Size(NamedTuple):
 
 
 def _size(parameters: Sequence[Estimate]) -> _Size:
-    """Return the size of a cause and its 95 % interval in words, without sign: that of its first parameter, or the
-    length of a vector.
-    """
+    """Return size and 95 % interval in words, without sign: of the first parameter, or of a vector's length."""
     if not parameters:
         return _Size()
     first = parameters[0]
@@ -150,6 +153,7 @@ def _size(parameters: Sequence[Estimate]) -> _Size:
     if first.name.endswith("_x"):
         values, sds = np.array([(p.value, p.sd) for p in parameters[:3]]).T
         value = float(np.linalg.norm(values))
+        # sd of |v| to first order: |v| = sqrt(v'v), so d|v| = v'dv / |v|
         reach = SIGMAS * float(np.linalg.norm(values * sds)) / value if value else float("nan")
         low, high = value - reach, value + reach
     else:
@@ -157,18 +161,8 @@ def _size(parameters: Sequence[Estimate]) -> _Size:
     if value < 0:
         low, high = -high, -low
     told = f"{digits(factor * abs(value), 2)} {unit}".strip()
-    if not np.isfinite([low, high]).all():
-        return _Size(told, "", value < 0)
-    return _Size(told, f" ({digits(factor * max(low, 0.0), 2)} to {digits(factor * high, 2)})", value < 0)
-
-
-def _alternative(alias: Alias, same: bool) -> str:
-    """Return a look-alike in words, by its place where it is the same cause elsewhere."""
-    if same:
-        whole, _, channel = alias.target.rpartition(":")
-        return place_in_words(whole if whole and channel in "xyz" else alias.target)
-    known = alias.cause.words
-    return known.alternative if known else f"a {spaced(alias.effect)}"
+    between = f" ({digits(factor * max(low, 0.0), 2)} to {digits(factor * high, 2)})"
+    return _Size(told, between if np.isfinite([low, high]).all() else "", value < 0)
 
 
 _SENTENCES = {

@@ -57,12 +57,9 @@ def lengths_of(vectors: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-_SPREAD = 256
-
-
 def spread_frames(values: Array) -> Array:
     """Return some hundred frames of ``values`` (T, ...), spread over the recording, to tell size and place."""
-    return values[:: max(1, len(values) // _SPREAD)]
+    return values[:: max(1, len(values) // 256)]
 
 
 def _is_frozen(value: ArrayLike) -> TypeGuard[Array]:
@@ -78,9 +75,8 @@ def assign(record: object, **values: object) -> None:
 
 def freeze(record: object, what: str, **shapes: tuple[int | None, ...]) -> None:
     """Make arrays of a frozen record read-only during its ``__post_init__``, each of its shape (`frozen_array`)."""
-    assign(
-        record, **{name: frozen_array(getattr(record, name), shape, f"{what}.{name}") for name, shape in shapes.items()}
-    )
+    for name, shape in shapes.items():
+        assign(record, **{name: frozen_array(getattr(record, name), shape, f"{what}.{name}")})
 
 
 def check_time(time: ArrayLike, what: str) -> Array:
@@ -139,6 +135,7 @@ def grouped(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
+    # with False at both ends the places of change are, in turn, the first True and the first False after it
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 

@@ -1,6 +1,4 @@
-"""What a person must see first, and what a verdict rests on or leaves out: the same records on page, terminal and in
-JSON.
-"""
+"""What a person must see first, and what a verdict rests on or leaves out, the same wherever it is shown."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -39,15 +37,12 @@ class LeftOut(StrEnum):
 
 
 def seconds_left_out(reasons: Mapping[LeftOut, Mask], rate: float) -> dict[LeftOut, float]:
-    """Return how many seconds each of the ``reasons`` (T,) takes out at ``rate`` Hz, in the order of `LeftOut`: a frame
-    counts once, at the first; without reasons that take out nothing.
-    """
+    """Return how many seconds each of the ``reasons`` (T,) takes out at ``rate`` Hz, each frame at the first."""
     found: dict[LeftOut, float] = {}
-    before: Mask | None = None
+    before = np.zeros((), dtype=bool)
     for reason in (one for one in LeftOut if one in reasons):
-        here = reasons[reason]
-        new = here if before is None else here & np.logical_not(before)
-        before = here if before is None else here | before
+        new = reasons[reason] & ~before
+        before = reasons[reason] | before
         if new.any():
             found[reason] = float(new.sum() / rate)
     return found
@@ -102,9 +97,7 @@ class Doubt(str):
 
 @dataclass(frozen=True)
 class Attention:
-    """One plain sentence that needs a person: its ``level``, the ``trial`` ("" for the session) and what it is
-    ``about`` (an effect of the family, a check, a step).
-    """
+    """A sentence with its ``level``, ``trial`` ("" = the session), and effect, check or step it is ``about``."""
 
     level: Level
     text: str
@@ -143,9 +136,7 @@ def without_path(reason: str, file: str) -> str:
 
 
 def told_together(found: Iterable[Attention]) -> tuple[Attention, ...]:
-    """Return the sentences with those of one check and limit, or of one wording, put into one that names its trials,
-    each in its order: five lines that differ in a number say less than one.
-    """
+    """Return the sentences with those of one check and limit, or of one wording, put into one."""
     return tuple(_together(rows) for rows in grouped((_wording(one), one) for one in found).values())
 
 

@@ -18,18 +18,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Encoders(Sampled):
-    """Joint angles over time, on the robot's own clock.
-
-    Parameters
-    ----------
-    time : array_like
-        (T,) s.
-    joints : tuple of str
-        (n) names.
-    angle : array_like
-        (T, n) rad.
-    notes : tuple of str
-        What was decided on reading.
+    """Joint angles over ``time`` (T,) s, on the robot's own clock: ``angle`` (T, n) rad of ``joints`` (n); ``notes`` on
+    what was decided on reading.
     """
 
     time: Array
@@ -139,6 +129,7 @@ class Motion(Sampled):
         state = np.array(self.state if np.size(self.state) else np.zeros((frames, joints)), dtype=np.int8)
         if state.shape != (frames, joints):
             raise BiodanceError(f"Motion.state has shape {state.shape}, expected ({frames}, {joints}).")
+        # an open frame that names no open angle: any of them may be the one
         unsaid = ~determined & (state != AngleState.NOT_DETERMINED).all(axis=1)
         state[unsaid] = AngleState.NOT_DETERMINED
         state.setflags(write=False)
@@ -236,6 +227,7 @@ class Motion(Sampled):
         True
         """
         root = (*(f"root {axis} (m)" for axis in "xyz"), *(f"root q{axis}" for axis in "xyzw"))[: self._root]
+        # the root has no state of its own: it is known wherever the posture is
         placed = np.where(self.determined[:, None], self.q[:, : self._root], np.nan)
         values = np.concatenate([placed, self.known_angles], axis=1)
         return in_time(self.time, values, (*root, *(f"{name} (deg)" for name in self._titles)))

@@ -136,10 +136,7 @@ class Subject:
 
 
 _INERTIAL = (
-    "mass (kg)",
-    "com x (m)",
-    "com y (m)",
-    "com z (m)",
+    *("mass (kg)", "com x (m)", "com y (m)", "com z (m)"),
     *(f"I{axes} (kg·m²)" for axes in ("xx", "xy", "yy", "xz", "yz", "zz")),
 )
 """Columns of a table of segments: centre of mass and inertia in and about the segment's joint frame."""

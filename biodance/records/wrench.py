@@ -1,6 +1,4 @@
-"""A measured time series and what is known of it beside its samples (where it came from, what was wrong in it, what is
-left out of it): where the markers were, and the wrench of the ground on the subject, in all and by plate.
-"""
+"""What was measured, and what is known of it: markers, and the wrench of the ground, in all and by plate."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -36,20 +34,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a trial came from.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    sha256 : str
-        Of its bytes.
-    format : str
-        What it was read as.
-    rate, analog_rate : float
-        Hz; NaN = none.
-    first_frame : int
-        Its number in the file.
+    """Where a trial came from: the file (``path``), ``sha256`` of its bytes, the ``format`` that it was read as,
+    ``rate`` and ``analog_rate`` (Hz; NaN = none), and the number of its ``first_frame`` there.
     """
 
     path: Path
@@ -62,20 +48,9 @@ class Source:
 
 @dataclass(frozen=True)
 class Defect:
-    """What was wrong in a recording and was left out when it was read.
-
-    Parameters
-    ----------
-    effect : str
-        The cause, by its name among the effects (``dead_plate``).
-    target : str
-        Where: a plate (``plate1``); "" for the whole recording.
-    text : str
-        What was seen and done, one plain sentence.
-    size : float
-        Of it, NaN = none.
-    unit : str
-        Of the size.
+    """What was wrong in a recording and was left out when it was read: an ``effect`` by its name (``dead_plate``) at a
+    ``target`` (``plate1``; "" = the whole recording), what was seen and done in a sentence (``text``), and its ``size``
+    (NaN = none) in a ``unit``.
     """
 
     effect: str
@@ -87,9 +62,7 @@ class Defect:
 
 @dataclass(frozen=True)
 class LeftOutSpan:
-    """Seconds ``start`` to ``end`` of a trial that the analyst leaves out: of one ``side`` its cycles, of "" all cycles
-    and the forces.
-    """
+    """Seconds ``start`` to ``end`` left out by the analyst: of a ``side`` its cycles, of "" forces and all cycles."""
 
     start: float
     end: float

@@ -1,6 +1,4 @@
-"""A designed dance: numbers for programs, files for the motion-capture screen, the robot and the person who calls it,
-cards to print, and what the commands print.
-"""
+"""A designed dance: numbers, files for the screen, the robot and the caller, cards, and what is printed."""
 
 from pathlib import Path
 from typing import Any
@@ -13,12 +11,19 @@ from biodance.dance.cues import REST, cue_sheet, dance_instructions, rests
 from biodance.dance.dance import Dance
 from biodance.dance.playback import Rehearsal
 from biodance.dance.problem.feet import room_on_plates
-from biodance.dance.problem.stance import Stance, stance_words
+from biodance.dance.problem.stance import stance_words
 from biodance.display import spaced
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.plain_text import for_spreadsheet
-from biodance.pipeline.dance import DanceResult, before_cues, not_safe
-from biodance.pipeline.preview import held_postures, preview_markers, preview_parameters, setpoints
+from biodance.pipeline.dance import (
+    DanceResult,
+    before_cues,
+    held_postures,
+    not_safe,
+    preview_markers,
+    preview_parameters,
+    setpoints,
+)
 from biodance.pipeline.still import posture_still, silhouettes
 from biodance.records import Array
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
@@ -39,11 +44,10 @@ _MIDDLE = "#8d99a6"
 
 
 def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS) -> str:
-    """Return the picture of the posture ``q`` (nq,): from the front (the person's right is on the left) and from the
-    right, or by other ``eyes``; ``title`` is read to those who cannot see it.
-    """
+    """Return the picture of the posture ``q`` (nq,) by ``eyes``; ``title`` is read to who cannot see it."""
     views = [(words, silhouettes(body, q, eye)) for words, eye in eyes]
     height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
+    # the first view's height fills the picture; a small robot or a child stays smaller than that
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
     for words, parts in views:
         across = np.concatenate([outline[:, 0] for _, outline, _ in parts])
@@ -117,9 +121,7 @@ def _expected(made: DanceResult) -> list[Row]:
 
 
 def _price(made: DanceResult) -> Row | None:
-    """Return the expected standard deviations (root mean square over the segments) with the dance as it is, and if the
-    same postures were chosen freely.
-    """
+    """Return the expected standard deviations (RMS over segments) of the dance, and of postures chosen freely."""
     if made.expectation is None or made.freely is None:
         return None
     both = {"with": made.expectation, "without": made.freely}
@@ -131,10 +133,8 @@ def _price(made: DanceResult) -> Row | None:
 
 def _counted(made: DanceResult) -> Row | None:
     """Return how many things are called at once, on average and at most."""
-    if made.dance is None:
-        return None
-    counts = [len(said) for said in dance_instructions(made.dance)]
-    return {"mean": float(np.mean(counts)), "max": max(counts)}
+    counts = [len(said) for said in dance_instructions(made.dance)] if made.dance else []
+    return {"mean": float(np.mean(counts)), "max": max(counts)} if counts else None
 
 
 _DANCE = Schema(
@@ -205,7 +205,10 @@ def write_dance(
         left_out = "\n\n".join(("", "# What was left out or corrected", *result.left_out)) if result.left_out else ""
         texts["margins.md"] = _MARGINS.format(markdown_table(MARGIN_ROW, found["margins"])) + left_out
         counted = np.flatnonzero(dance.counted).tolist()
-        titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
+        words = {"parallel": "feet parallel", "right_forward": "right forward", "seated": "seated"}
+        names = [dance.stances[p].name for p in counted]
+        stood = [words.get(name, f"on the {name.removeprefix('single_')}") for name in names]
+        titles = tuple(f"{p + 1} {said}" for p, said in zip(counted, stood, strict=True))
         postures = held_postures(dance, counted).q
         drawn = {
             "postures": postures_figure(dance.body, postures, titles),
@@ -249,12 +252,6 @@ def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Pa
     return {"cues.md": cues, "cues.html": cards_page(result, language)}
 
 
-def _short(stance: Stance) -> str:
-    return {"parallel": "feet parallel", "right_forward": "right forward", "seated": "seated"}.get(
-        stance.name, f"on the {stance.name.removeprefix('single_')}"
-    )
-
-
 def angle_table(dance: Dance) -> str:
     """Return a robot's joint angles over time as CSV (`setpoints`)."""
     names, rows = setpoints(dance)
@@ -267,13 +264,10 @@ def angle_sheet(dance: Dance) -> str:
     angles = np.degrees(held_postures(dance).q[:, 7:])
     joints = [spaced(joint.name) for joint in dance.body.joints]
     lines = [
-        "# The dance, posture by posture",
-        "",
-        f"Angles in degrees. {float(np.median(dance.move)):g} s to get to each posture (`dance.csv` says how), then "
-        f"{float(dance.hold.max()):g} s of standing still. Feet that stand are flat and point straight ahead.",
-        "",
-        f"| | feet | {' | '.join(joints)} |",
-        "|---" * (len(joints) + 2) + "|",
+        f"# The dance, posture by posture\n\nAngles in degrees. {float(np.median(dance.move)):g} s to get to each "
+        f"posture (`dance.csv` says how), then {float(dance.hold.max()):g} s of standing still. Feet that stand are "
+        "flat and point straight ahead.\n",
+        f"| | feet | {' | '.join(joints)} |\n{'|---' * (len(joints) + 2)}|",
     ]
     for number, (stance, row) in enumerate(zip(dance.stances, angles, strict=True), start=1):
         lines.append(f"| {number} | {stance_words(stance)} | {' | '.join(f'{angle + 0.0:.1f}' for angle in row)} |")

@@ -1,6 +1,4 @@
-"""Files that stand whole or not at all, and never over what is there. Tables are written twice: as CSV, for eyes and
-spreadsheets, and as Parquet, which keeps types and is read ten times faster.
-"""
+"""Files that stand whole or not at all; tables as CSV, for spreadsheets, and as Parquet, which keeps types."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,13 +52,8 @@ ENDINGS = (".csv", ".parquet")
 
 
 def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
-    """Return the folder for tables, made if missing, before any long work starts.
-
-    Raises
-    ------
-    SessionRefused
-        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not
-        ``force``.
+    """Return the folder for tables, made if missing, before any long work starts. Raises SessionRefused: it is the
+    session folder or one above it, a file, holds anything else than tables, or holds tables and not ``force``.
     """
     folder, session = folder.resolve(), session.resolve()
     if folder == session or folder in session.parents:

@@ -1,6 +1,4 @@
-"""A session while it runs: the page that an operator watches, served to this machine alone, over its loopback; what is
-printed, and the document for programs.
-"""
+"""A session while it runs: the operator's page, served over the loopback alone, what is printed, the document."""
 
 import json
 import sys
@@ -19,8 +17,8 @@ from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.display import cause_in_words, spaced
 from biodance.errors import BiodanceError
-from biodance.pipeline.asked import asked_posture
 from biodance.pipeline.live import LiveResult, LiveState
+from biodance.pipeline.still import asked_posture
 from biodance.report.dance import mannequin_svg
 from biodance.report.pages.template import template_text
 from biodance.report.tables.identification import ASKED
@@ -35,27 +33,20 @@ _WARNING = Schema("time_s effect target text")
 
 
 def live_document(found: LiveResult) -> Row:
-    """Return the content of ``biodance live --json``: times a frame in ms (processor time of the one core that is used;
-    ``wall`` by the clock, which other programs lengthen), what is known, and what was warned of.
-    """
+    """Return ``biodance live --json``: ms a frame of one core (``wall`` by the clock), masses, warnings."""
     one = found.identification
+    cores, wall = (
+        {"median": float(np.median(ms)), "p99": float(np.percentile(ms, 99)), "longest": float(ms.max())}
+        for ms in (1000 * found.frame_s, 1000 * found.wall_s)
+    )
     return {
         "frames": found.frame_s.size,
         "frames_used": int(found.fit.use.sum()) if found.fit else 0,
-        "frame_ms": _spread(found.frame_s) | {"wall": _spread(found.wall_s)},
+        "frame_ms": cores | {"wall": wall},
         "known": KNOWN_ROW.rows(known for known in (one.known if one else ()) if known.quantity in ASKED),
         "warnings": _WARNING.rows(found.warnings),
         "next": found.state.advice,
         "cause": found.cause,
-    }
-
-
-def _spread(seconds: np.ndarray) -> dict[str, float]:
-    milliseconds = 1000 * seconds
-    return {
-        "median": float(np.median(milliseconds)),
-        "p99": float(np.percentile(milliseconds, 99)),
-        "longest": float(milliseconds.max()),
     }
 
 
@@ -112,13 +103,8 @@ class _Server(ThreadingHTTPServer):
 
 
 class LivePage:
-    """A page at ``address`` that shows the newest state of a stream; a context, closed at its end. Once it knows the
-    ``body`` it draws what is asked, too.
-
-    Parameters
-    ----------
-    port : int
-        Of 127.0.0.1; 0 takes a free one.
+    """A page at ``address`` that shows the newest state of a stream; a context, closed at its end, at a ``port`` of
+    127.0.0.1 (0 = a free one). Once it knows the ``body`` it draws what is asked, too.
 
     Raises
     ------
@@ -128,8 +114,8 @@ class LivePage:
 
     def __init__(self, port: int = 0) -> None:
         self._lock, self._fetched, self._watched = Lock(), Event(), False
-        self._said: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
-        self._said["picture"] = ""
+        nothing: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
+        self._said = nothing | {"picture": ""}
         self._pictures: dict[str, str] = {}
         self.body: Body | None = None
         try:
@@ -183,12 +169,6 @@ class LivePage:
         with self._lock:
             self._said.update(said)
 
-    def _state(self) -> bytes:
-        """Return what is said now, to a page that watches."""
-        self._watched = True
-        with self._lock:
-            return json.dumps(self._said).encode()
-
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         page = self
 
@@ -201,7 +181,9 @@ class LivePage:
                 if asked == "/":
                     code, kind, body = 200, "text/html; charset=utf-8", template_text("live.html").encode()
                 elif asked == "/state.json":
-                    code, kind, body = 200, "application/json", page._state()
+                    page._watched = True
+                    with page._lock:
+                        code, kind, body = 200, "application/json", json.dumps(page._said).encode()
                 self.send_response(code)
                 for name, value in {"Content-Type": kind, "Content-Length": str(len(body)), **_HEADERS}.items():
                     self.send_header(name, value)

@@ -1,8 +1,6 @@
-"""A paragraph on the methods for a paper or a record, with its references: every clause says a value of results.json,
-and goes where that value is not.
-"""
+"""A paragraph on the methods with its references: each clause says a value of results.json, or goes without it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,15 +36,16 @@ class MethodClause:
     cites: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def keys(self) -> tuple[tuple[str, ...], ...]:
+    def keys(self) -> list[list[str]]:
         """The paths of its values."""
-        return tuple(tuple(place.split("/")) for place in self.places.split())
+        return [place.split("/") for place in self.places.split()]
 
 
 def methods_text(document: Mapping[str, Any]) -> str:
     """Return the paragraph as Markdown for the content of a results.json (of report or of identify)."""
     said, cited = [], []
     for clause in CLAUSES:
+        # a clause of which any value is not known is left out, with what it cites
         values = [_value(document, path) for path in clause.keys]
         if any(value is None for value in values):
             continue
@@ -59,10 +58,8 @@ def methods_text(document: Mapping[str, Any]) -> str:
     return text + (f"\n## References\n\n{references}\n" if references else "")
 
 
-def _value(document: Mapping[str, Any], path: tuple[str, ...]) -> Any:
-    """Return the value at a path; None where there is none. What identification found stands at the top of its own
-    results.json.
-    """
+def _value(document: Mapping[str, Any], path: Sequence[str]) -> Any:
+    """Return the value at a path, or None; identification stands at the top of its own results.json."""
     whole = document.get("identification") is None and path[0] == "identification"
     found: Any = document
     for key in path[1:] if whole else path:
@@ -88,7 +85,9 @@ def _trials(trials: list[dict[str, Any]]) -> str:
 def _filter(kind: str, order: float, trials: list[dict[str, Any]]) -> str:
     if not trials:
         return ""
-    markers, forces = (_range([one[key] for one in trials]) for key in ("markers_hz", "forces_hz"))
+    used = ([one[key] for one in trials] for key in ("markers_hz", "forces_hz"))
+    ends = ((min(cutoffs), max(cutoffs)) for cutoffs in used)
+    markers, forces = (f"{low:g} Hz" if low == high else f"{low:g} to {high:g} Hz" for low, high in ends)
     both = "" if forces == markers else f" (forces: {forces})"
     own = any(one["chosen_by"] == "trial" for one in trials)
     how = ", in each trial where the filtered markers lie nearest to the path of rigid segments" if own else ""
@@ -97,11 +96,6 @@ def _filter(kind: str, order: float, trials: list[dict[str, Any]]) -> str:
         f"Joint coordinates and forces were low-pass filtered forwards and backwards ({words}, order {order:g} in each "
         f"direction, {markers}{both}{how})."
     )
-
-
-def _range(cutoffs: list[float]) -> str:
-    low, high = min(cutoffs), max(cutoffs)
-    return f"{low:g} Hz" if low == high else f"{low:g} to {high:g} Hz"
 
 
 def _segments(segments: list[dict[str, Any]], trials: list[str], rank: int, count: int) -> str:
@@ -156,13 +150,6 @@ def _by_hand(trials: list[dict[str, Any]]) -> str:
     return f" Those of {', of '.join(feet)} were set by hand." if feet else ""
 
 
-def _scaled(table: str, hip: str) -> str:
-    return (
-        f"A model of rigid segments was scaled on the static trial; segment masses and inertias were taken from the "
-        f"table {table}, hip joint centres from the regression of {hip.title()}."
-    )
-
-
 _MOVED = {
     True: "Joint centres were then corrected by the movement where it showed them.",
     False: "Joints were not moved.",
@@ -183,7 +170,10 @@ CLAUSES: tuple[MethodClause, ...] = (
     ),
     MethodClause(
         "provenance/settings/table provenance/settings/hip",
-        _scaled,
+        lambda table, hip: (
+            f"A model of rigid segments was scaled on the static trial; segment masses and inertias were taken from "
+            f"the table {table}, hip joint centres from the regression of {hip.title()}."
+        ),
         {"de Leva": "de_leva", "Harrington": "Harrington", "Davis": "Davis"},
     ),
     MethodClause("provenance/settings/joints", lambda joints: _MOVED[joints == "functional"]),

@@ -69,10 +69,9 @@ def _inspected_lines(record: Row) -> list[str]:
         lines.append(f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {load} N vertical on average")
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
-        on_plates, declared = record.get("mass_on_plates_kg"), record.get("declared_mass_kg")
-        weighed = "not known, nobody stands still" if on_plates is None else f"{format_number(on_plates, 2)} kg"
-        told = "none" if declared is None else f"{format_number(declared, 2)} kg"
-        lines.append(f"mass on the plates {weighed}; declared {told}")
+        masses = (record.get("mass_on_plates_kg"), record.get("declared_mass_kg"))
+        weighed, told = (mass if mass is None else f"{format_number(mass, 2)} kg" for mass in masses)
+        lines.append(f"mass on the plates {weighed or 'not known, nobody stands still'}; declared {told or 'none'}")
     return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
 
 
@@ -97,8 +96,9 @@ def print_initialised(found: Row, console: Console) -> None:
     subject = found["subject"]
     names = {"mass_kg": "mass", "height_m": "stature", "sex": "sex", "age": "age"}
     said = ", ".join(
-        f"{key} {'not known' if subject[key] is None else subject[key]}"
-        + (" (guessed)" if subject[key] is not None and name in subject["guessed"] else "")
+        f"{key} not known"
+        if subject[key] is None
+        else f"{key} {subject[key]}{' (guessed)' if name in subject['guessed'] else ''}"
         for key, name in names.items()
     )
     print_line(console, f"subject: {said}")
@@ -146,10 +146,8 @@ def print_identification(found: Row, console: Console) -> None:
     if found["segments"]:
         print_table(SEGMENT_ROW, found["segments"], console, only=_MASSES)
     for row in found["validation"]:
-        told = ", ".join(
-            f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
-        )
-        print_line(console, f"{row['trial']}, RMS Fx Fy Fz Mx My Mz: {told}")
+        table, own = (" ".join(format_number(x) for x in row[name]["rms"]) for name in ("table", "identified"))
+        print_line(console, f"{row['trial']}, RMS Fx Fy Fz Mx My Mz: table {table}, identified {own}")
         print_line(console, f"{row['trial']}: {parted_gain(row['gain'])}")
     print_line(console, f"added mass: {found['added_mass_search']['text']}")
     if found["performance"]:

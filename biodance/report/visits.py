@@ -1,6 +1,4 @@
-"""What changed between visits of one person: numbers for programs, the page (the sentence, curves of all visits, every
-quantity), and what `biodance compare` prints.
-"""
+"""What changed between visits of one person: numbers, the page, and what `biodance compare` prints."""
 
 import math
 from collections.abc import Sequence
@@ -25,9 +23,8 @@ from biodance.report.tables.diagnosis import ATTENTION_ROW
 from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.report.terminal import print_line, print_table
-from biodance.report.wording import changed, millimetres, moment, sized_together
+from biodance.report.wording import changed, millimetres, sized_together
 from biodance.uncertainty.visits import FEWEST_STRIDES, placement_sizes
-from biodance.version import __version__
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -69,10 +66,10 @@ def visits_document(found: VisitComparison) -> Row:
 
 def comparison_sentence(found: VisitComparison) -> str:
     """Return in one sentence what changed: how many quantities, and the largest beside its uncertainty."""
+    untested = len(found.quantities) - found.tested
     if not found.tested:
         return "Nothing can be told to have changed: no quantity has an interval in the first and the last visit."
     if not found.changed:
-        untested = len(found.quantities) - found.tested
         few = f" {untested} of {len(found.quantities)} quantities could not be tested." if untested else ""
         return f"Nothing changed beyond its uncertainty.{few}"
     one, count = found.changed[0], len(found.changed)
@@ -93,9 +90,7 @@ def quantity_in_words(one: ComparedQuantity) -> str:
 
 def _interval(interval: tuple[float, float] | None, unit: str) -> str:
     """Return both ends, the unit once: ``+142 to +186 mm``."""
-    if interval is None:
-        return "–"
-    return sized_together(interval, unit, " to ", signed=True)
+    return "–" if interval is None else sized_together(interval, unit, " to ", signed=True)
 
 
 def shown_quantities(found: VisitComparison) -> list[Row]:
@@ -140,9 +135,7 @@ _DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")  # Of all visits but the last, in tur
 
 
 def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequence[str]) -> str:
-    """Return one panel for each quantity of the cycles of a ``kind`` on a ``side``: the mean of every visit with one
-    standard deviation between its cycles, and how many they are; "" where no quantity is known in two visits.
-    """
+    """Return a panel a quantity with the mean and sd of every visit; "" where none is known in two visits."""
     # the last visit is drawn full in the side's colour, the others grey and dashed
     looks = [svg.Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
     looks, cells = [*looks, svg.Stroke(_COLOURS[side], "", 1.6)], []
@@ -191,11 +184,10 @@ def visits_page(found: VisitComparison, document: Row) -> str:
             about = f"{CYCLE_KINDS[kind]}, {'trunk and pelvis' if side == 'middle' else side}"
             figures.append((about, angles, loads))
     rows, title = shown_quantities(found), f"Visits {' and '.join((names[0], names[-1]))}"
-    sheet = print_sheet(title, {}, f"biodance {__version__}, {moment(document['created_utc'])}")
     return render(
         "visits.html.j2",
         scripts=[template_text("curves.js")],
-        sheet=Markup(sheet),
+        sheet=print_sheet(title, {}, document["created_utc"]),
         title=title,
         document=document,
         schema=QUANTITY_ROW,
@@ -208,9 +200,7 @@ def visits_page(found: VisitComparison, document: Row) -> str:
 
 
 def write_visits(found: VisitComparison, folder: Path) -> Row:
-    """Write ``compare.html``, ``results.json`` and ``quantities.csv`` into ``folder`` (which exists) and return the
-    numbers.
-    """
+    """Write ``compare.html``, ``results.json`` and ``quantities.csv`` into ``folder``; return the numbers."""
     document = visits_document(found)
     texts = {
         COMPARE_PAGE: visits_page(found, document),

@@ -20,6 +20,7 @@ def format_number(value: float | None, digits: int = 1) -> str:
     """Return a number as text with a true minus sign; "–" where it is unknown."""
     if value is None or not math.isfinite(value):
         return "–"
+    # what rounds to zero has no sign
     text = f"{value:.{digits}f}"
     return text.replace("-", "−") if float(text) else text.lstrip("-")
 
@@ -60,6 +61,7 @@ def _shown(value: float, unit: str) -> tuple[str, str]:
     """Return a number and its unit as a person says them."""
     factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 4 if unit == "kg·m²" else 2))
     shown = factor * value
+    # three significant digits: a number of the order 10^n shows 2 - n of them behind the point
     large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
     return format_number(shown, max(0, min(digits, 2 - large))), name
 
@@ -86,9 +88,7 @@ def parted_gain(gain: dict[str, dict[str, Any]]) -> str:
 
 
 def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
-    """Return causes (effect, target) by effect, the first targets of each by name: ``marker misplaced (C7, CLAV and 3
-    more)``.
-    """
+    """Return causes by effect, the first targets by name: ``marker misplaced (C7, CLAV and 3 more)``."""
     out = []
     for effect, of in grouped((spaced(effect), cause_in_words("", target)) for effect, target in causes).items():
         more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
@@ -138,8 +138,3 @@ def trial_and_subject(one: Attention) -> str:
         return one.trial if about else f"Trial {one.trial}"
     place = f", {one.trial}" if one.trial else ""
     return f"{about[:1].upper()}{about[1:]}{place}" or "Session"
-
-
-def first_upper(text: str) -> str:
-    """Return ``text`` with a capital first letter and nothing else changed."""
-    return text[:1].upper() + text[1:]

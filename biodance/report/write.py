@@ -11,17 +11,16 @@ from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.plates.faults import APPLIED, PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import corrected_attention, identified_attention, session_attention
-from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
-from biodance.pipeline.load import as_diagnosed
 from biodance.pipeline.movement import SessionMovement, describe_movement
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
-from biodance.pipeline.session_frames import frames_of
+from biodance.pipeline.still import frames_of
 from biodance.records.attention import Attention
 from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
@@ -31,7 +30,7 @@ from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
 from biodance.report.tables.frames import write_session_tables
-from biodance.report.tables.identification import corrected_document, identification_document
+from biodance.report.tables.identification import CORRECTED_ROW, identification_document
 from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import (
     PROVENANCE_ROW,
@@ -55,9 +54,7 @@ def write_session(
     drawn: bool = True,
     tell: Callable[[str], None],
 ) -> tuple[SessionResult, dict[str, Any]]:
-    """Write what was found in a session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for
-    the person who was measured in that language; return the result and the content of results.json.
-    """
+    """Write what was found in a session, its ``tables``, and a page ``for_subject`` in that language."""
     diagnosis = found.diagnosis if found else None
     result = as_diagnosed(result, diagnosis) if diagnosis else result
     moved = describe_movement(result, lab=lab, tell=tell)
@@ -76,9 +73,7 @@ def write_report(
     movement: SessionMovement | None = None,
     drawn: bool = True,
 ) -> dict[str, Any]:
-    """Write ``report.html`` (where ``drawn``), ``methods.md`` and ``results.json`` into ``folder`` (which exists) and
-    return the content of the latter.
-    """
+    """Write ``report.html`` (where ``drawn``), ``methods.md``, ``results.json``; return the latter's content."""
     made = provenance(result, created=now())
     first = (*diagnosis.diagnosis.attention, *corrected_attention(result)) if diagnosis else session_attention(result)
     judged = diagnosis.diagnosis.judged if diagnosis else ()
@@ -95,6 +90,14 @@ def write_report(
     if drawn:
         files |= {PAGE: _page(result, made, first, diagnosis, movement)} | _kept(result, folder)
     return write_results(folder, found, files)
+
+
+def _moved(result: SessionResult, movement: SessionMovement | None) -> dict[str, Any]:
+    return {
+        "filter": filter_document(result),
+        "movement": movement_document(movement),
+        "gait": gait_document(movement),
+    }
 
 
 def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
@@ -126,10 +129,8 @@ def write_identification(
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(identified_trials(result)),
         **identification_document(found),
-        "corrected": corrected_document(found),
-        "filter": filter_document(result),
-        "movement": movement_document(movement),
-        "gait": gait_document(movement),
+        "corrected": CORRECTED_ROW.rows(found.corrected),
+        **_moved(result, movement),
         "provenance": PROVENANCE_ROW.row(made),
     }
     told: dict[str, Any] = plain_values(numbers)
@@ -152,14 +153,11 @@ def write_diagnosis(
     corrections made ``earlier``), the trials corrected, and copies of recordings with their labels put right.
     """
     made = provenance(result, created=now())
-    failures = {**result.failures, **found.failures}
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
-        "filter": filter_document(result),
-        "movement": movement_document(movement),
-        "gait": gait_document(movement),
-        "failures": failures,
+        **_moved(result, movement),
+        "failures": {**result.failures, **found.failures},
         "provenance": PROVENANCE_ROW.row(made),
     }
     files = {PAGE: diagnosis_page(result, found, made)}
@@ -172,27 +170,24 @@ def write_diagnosis(
 def _accepted(
     result: SessionResult, found: SessionDiagnosis, folder: Path, earlier: tuple[PlateCorrection, ...]
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
-    write. Only what is proven to gain on data that were not used is taken off or believed.
-    """
+    """Write what is proven: corrected trials, copies; return acceptance in words, and files left to write."""
     name, undone = f"session {result.session.folder.name}", found.mended.checks if found.mended else ()
-    findings = _not_put_right(found, undone)
-    proven = _is_proven(found)
+    findings, proven = _not_put_right(found, undone), found.gain is not None and found.gain.proven
     copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
-    files = _accepted_body(found, findings, name) | _lab_file(earlier, made)
-    written = (*copied, *(Written(file, what) for file, (_, what) in files.items()))
+    files = _accepted_files(found if proven else None, findings, earlier, made, name)
     rewritten = (*(one.text for one in undone if one.effect != LabelsSwapped.name), *map(str, made))
     trials, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
+    written = (*copied, *(Written(file, what) for file, (_, what) in files.items()), *_of_trials(trials, rewritten))
     left = _not_applied(findings, proven=proven)
     others = {*left, *((one.effect, one.target) for one in made)}
     document = {
-        "files": [*sorted(files), *(one.file for one in written if one.file not in files)],
+        "files": [*sorted(files), *(one.file for one in copied)],
         "corrections": [*dict.fromkeys(f"{one.text} Put right in a copy." for one in undone), *map(str, made)],
         "trials": trials,
         "not_in_recordings": [cause_name(key) for one in findings if (key := (one.effect, one.target)) not in others],
         "refused": [*refused, *kept],
-        "written": [one._asdict() for one in (*written, *_of_trials(trials, rewritten))],
+        "written": [one._asdict() for one in written],
         "not_applied": [{"cause": cause_name(names), "why": why} for names, why in left.items()],
     }
     return document, {file: text for file, (text, _) in files.items()}
@@ -205,55 +200,45 @@ def _not_put_right(found: SessionDiagnosis, undone: Sequence[QualityCheck]) -> t
     return tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
 
 
-def _is_proven(found: SessionDiagnosis) -> bool:
-    return found.gain is not None and found.gain.proven
-
-
-def _accepted_body(found: SessionDiagnosis, findings: Sequence[Finding], name: str) -> dict[str, tuple[str, str]]:
-    """Return, by its file, the text of the body with the findings accepted and what it is; {} where not solved or
-    not proven to gain.
-    """
-    body = found.accepted
-    if body is None or body.status != "solved" or not _is_proven(found):
-        return {}
-    named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
-    text = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
-    return {BODY_FILE: (text, f"the body identified with {named} accepted")}
-
-
-def _lab_file(earlier: tuple[PlateCorrection, ...], made: tuple[PlateCorrection, ...]) -> dict[str, tuple[str, str]]:
-    """Return, by its file, the text of the corrections that last in this laboratory and what it is; {} without one."""
-    text = lab_text(earlier, made) if made else ""
-    lasting = "; ".join(str(one) for one in made if one.fault.lasting)
-    return {LAB: (text, f"to be taken off other sessions: {lasting or 'as before'}")} if text else {}
+def _accepted_files(
+    proven: SessionDiagnosis | None,
+    findings: Sequence[Finding],
+    earlier: tuple[PlateCorrection, ...],
+    made: tuple[PlateCorrection, ...],
+    name: str,
+) -> dict[str, tuple[str, str]]:
+    """Return by file its text and what it is: the body of a ``proven`` diagnosis, and the corrections that last."""
+    files, body = {}, proven.accepted if proven else None
+    if body is not None and body.status == "solved":
+        named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
+        text = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
+        files[BODY_FILE] = (text, f"the body identified with {named} accepted")
+    if made and (text := lab_text(earlier, made)):
+        lasting = "; ".join(str(one) for one in made if one.fault.lasting)
+        files[LAB] = (text, f"to be taken off other sessions: {lasting or 'as before'}")
+    return files
 
 
 def _of_trials(trials: tuple[str, ...], changes: tuple[str, ...]) -> list[Written]:
     """Return what was written of trials with these ``changes``."""
-    if not changes:
-        return []
     told = "; ".join(changes)
     beside = Written(f"{CORRECTED}/{APPLIED}", f"says what was taken off: {told}")
     roles = Written(f"{CORRECTED}/session.toml", "subject and roles")
-    return [beside, roles, *(Written(f"{CORRECTED}/{trial}.c3d", f"taken off: {told}") for trial in trials)]
+    return [beside, roles, *(Written(f"{CORRECTED}/{one}.c3d", f"taken off: {told}") for one in trials)] if told else []
 
 
 def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[str, str], str]:
-    """Return by effect and target why a finding was not accepted: corrections of recordings go by their own gain, all
-    else by that of all together (``proven``).
-    """
+    """Return by cause why it was not accepted: corrections go by their own gain, all else by that of all."""
     out = {}
     for one in findings:
         recorded = bool(accepted_corrections((one,), ""))
-        good = one.gain is not None and one.gain.proven if recorded else proven and bool(one.changes)
-        if good:
+        if one.gain is not None and one.gain.proven if recorded else proven and one.changes:
             continue
-        low, high = (100 * x for x in one.gain.ci95) if one.gain else (0.0, 0.0)
-        out[one.effect, one.target] = (
-            f"on data that were not used it removes {low:.0f} to {high:.0f} % of the difference: no proven gain"
-            if one.gain
-            else "what it gains on data that were not used is not measured"
-        )
+        why = "what it gains on data that were not used is not measured"
+        if one.gain:
+            low, high = (100 * x for x in one.gain.ci95)
+            why = f"on data that were not used it removes {low:.0f} to {high:.0f} % of the difference: no proven gain"
+        out[one.effect, one.target] = why
     return out
 
 
@@ -264,7 +249,5 @@ def _page(
     diagnosis: SessionDiagnosis | None = None,
     movement: SessionMovement | None = None,
 ) -> str:
-    told = diagnosis_section(diagnosis) if diagnosis else ""
-    moved = movement_section(movement) if movement else ""
-    frames = frames_of(result)
-    return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)
+    told, moved = diagnosis_section(diagnosis) if diagnosis else "", movement_section(movement) if movement else ""
+    return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames_of(result))

@@ -14,7 +14,8 @@ from biodance.records import SIDES
 from biodance.report.figures import vector as svg
 from biodance.report.wording import format_number
 
-_LOOKS = {"right": svg.RIGHT_SIDE, "left": svg.LEFT_SIDE, "middle": svg.MIDDLE_SIDE}
+_LOOKS = svg.SIDE_STROKES
+_DOTTED = {side: svg.Stroke(look.colour, "1 2", 1.1) for side, look in _LOOKS.items()}
 _NORMAL = svg.Stroke(GREY, "1 3", 0.8)
 _THIN, _MOST = 0.4, 12
 """px of one repetition, and repetitions of a side that are drawn; the mean is over all."""
@@ -54,9 +55,7 @@ _CONSISTENT = (
 def repetitions_figure(
     found: Repetitions, quantities: Sequence[str], about: str, normal: Sequence[NormalCurve] = ()
 ) -> str:
-    """Return one panel for each quantity: repetitions thin, mean and one sd of each side, when the foot leaves, plug-in
-    gait's own mean where the files hold it, before the ``normal`` bands; "" where none is known.
-    """
+    """Return a panel a quantity: repetitions, mean, sd of sides, before ``normal`` bands; "" for none."""
     groups = [one for one in found.groups if np.isfinite(one.mean).any()]
     # where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side
     offs = [(found.off(side), _LOOKS[side]) for side in (SIDES if found.kind == "gait" else ("middle",))]
@@ -67,11 +66,8 @@ def repetitions_figure(
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
             usual = [svg.Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
-            theirs = [
-                svg.Curve(f"{one.side}, plug-in gait", one.mean, svg.Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
-                for one in found.file_groups
-                if one.quantity == quantity
-            ]
+            files = [one for one in found.file_groups if one.quantity == quantity]
+            theirs = [svg.Curve(f"{one.side}, plug-in gait", one.mean, _DOTTED[one.side]) for one in files]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
             curves = [*usual, *_curves(same), *theirs]
             cells.append([svg.Strip(curve_title(same[0]), curves, least=least, rules=rules)])
@@ -105,25 +101,20 @@ def pressure_figure(found: Repetitions) -> str:
     """Return the mean way of the pressure along each sole, from the heel up; "" where none is known."""
     ways = {}
     for side in SIDES:
-        # the mean where at least half of the cycles are known: elsewhere it is of another few
-        same = {
-            one.quantity: np.where(2 * np.isfinite(one.values).sum(axis=0) >= len(one.values), one.mean, np.nan)
-            for one in found.groups
-            if one.side == side
-        }
-        if "pressure_ahead" in same:
-            ways[side] = 1000 * np.stack([same["pressure_outward"], same["pressure_ahead"]], axis=1)
+        own = {one.quantity: one for one in found.groups if one.side == side}
+        if "pressure_ahead" in own:
+            ends = (own[name] for name in ("pressure_outward", "pressure_ahead"))
+            # the mean where at least half of the cycles are known: elsewhere it is of another few
+            known = [np.where(2 * np.isfinite(e.values).sum(axis=0) >= len(e.values), e.mean, np.nan) for e in ends]
+            ways[side] = 1000 * np.stack(known, axis=1)
     if not ways:
         return ""
     every = np.concatenate(list(ways.values()))
-    x, y = svg.around(every[:, 0], least=120.0), svg.around(every[:, 1], least=150.0)
-    x = svg.Axis(x.low, x.high, "outward of the line heel to toe (mm)")
-    y = svg.Axis(y.low, y.high, "centre of pressure ahead of the heel (mm)")
+    x = svg.around(every[:, 0], least=120.0, label="outward of the line heel to toe (mm)")
+    y = svg.around(every[:, 1], least=150.0, label="centre of pressure ahead of the heel (mm)")
     marks = [svg.segments(x, y, way, _LOOKS[side]) for side, way in ways.items()]
-    drawn = svg.panel(
-        x, y, marks, "Mean way of the centre of pressure on each sole.", frame=svg.Frame(width=270.0, height=150.0)
-    )
-    return f'<div class="cell">{drawn}</div>'
+    about, frame = "Mean way of the centre of pressure on each sole.", svg.Frame(width=270.0, height=150.0)
+    return f'<div class="cell">{svg.panel(x, y, marks, about, frame=frame)}</div>'
 
 
 def consistency_figure(found: Repetitions) -> str:
@@ -136,16 +127,14 @@ def consistency_figure(found: Repetitions) -> str:
     for name in _CONSISTENT:
         some = [one for one in found.key_values if one.name == name]
         if some:
-            y = svg.around(np.array([one.value for one in some]), least=LEAST_SPANS[some[0].unit])
-            y = svg.Axis(y.low, y.high, f"{spaced(name)} ({some[0].unit})")
+            label = f"{spaced(name)} ({some[0].unit})"
+            y = svg.around(np.array([one.value for one in some]), least=LEAST_SPANS[some[0].unit], label=label)
             marks = []
             for side, shift in (("right", -0.12), ("left", 0.12)):
                 own = [(place[one.cycle.trial] + shift, one.value) for one in some if one.side == side]
                 across, up = np.array(own).reshape(-1, 2).T
                 inside = "" if side == "right" else "#ffffff"
                 marks.append(svg.points(x, y, across, up, _LOOKS[side], inside=inside))
-            about = f"{spaced(name)} of every cycle by trial, right and left."
-            cells.append(
-                f'<div class="cell">{svg.panel(x, y, marks, about, frame=svg.Frame(width=270.0, height=80.0))}</div>'
-            )
+            about, frame = f"{spaced(name)} of every cycle by trial, right and left.", svg.Frame(270.0, 80.0)
+            cells.append(f'<div class="cell">{svg.panel(x, y, marks, about, frame=frame)}</div>')
     return f'<div class="curves"><div class="cells three">{"".join(cells)}</div></div>' if cells else ""

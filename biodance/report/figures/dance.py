@@ -1,6 +1,4 @@
-"""Figures of a dance: postures as stick figures (paper Fig. 3), criterion by transition (Fig. 5), ZMP (Fig. 6),
-expected accuracy; and the film of one that is played in MuJoCo, as .gif, or as .mp4 where ffmpeg is installed.
-"""
+"""Figures of a dance (paper Figs. 3, 5, 6; expected accuracy), and its film from MuJoCo, as .gif or .mp4."""
 
 import shutil
 import subprocess
@@ -37,11 +35,10 @@ VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
 
 
 def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
-    """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red
-    and dashed.
-    """
+    """Draw postures ``q`` (P, nq) in rows of ten, titled, to one scale; right is blue, left red and dashed."""
     lines, sides = bone_lines(body, poses(body, q))
     flat = lines @ VIEW.T
+    # each posture about its own middle, heights as they are
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
     rows = -(-len(q) // _COLUMNS)
@@ -66,9 +63,8 @@ def criterion_figure(values: Array, bound: float) -> "Figure":
     with look():
         drawn = figure(2.6)
         axes = drawn.subplots()
-        axes.semilogy(
-            np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition"
-        )
+        look_of = {"color": BLUE, "marker": "o", "markersize": 3, "label": "after the transition"}
+        axes.semilogy(np.arange(1, len(values) + 1), values, **look_of)
         axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
         axes.set(xlabel="transition", ylabel="sum of M cond(W_bi), kg")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -85,6 +81,7 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
         for column, name in enumerate(names):
             mine = [path for path in paths if path.stance.name == name]
             feet = mine[0].stance
+            # the base of support shrunk about its centre
             usable = feet.centre + feet.share * (feet.support - feet.centre)
             for axes, colour, what in zip(panels[:, column], (BLUE, ORANGE), ("designed", "straight"), strict=True):
                 _outline(axes, feet.support, BLACK, "-", "base of support")
@@ -99,11 +96,8 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
         panels[0, 0].set(xlim=(low[0] - 0.1, high[0] + 0.1), ylim=(low[1] - 0.1, high[1] + 0.1))
         for axes in panels[:, 0]:
             axes.set_ylabel("lab y, m")
-        handles = {
-            label: handle
-            for axes in panels[:, 0]
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
+        pairs = (zip(*axes.get_legend_handles_labels(), strict=True) for axes in panels[:, 0])
+        handles = {label: handle for some in pairs for handle, label in some}
         drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2)
     return drawn
 
@@ -116,15 +110,11 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
         drawn = figure(2.9)
         left, right = drawn.subplots(1, 2, sharex=True, sharey=True)
         for axes, values, title in ((left, expectation.mass, "mass"), (right, expectation.com, "centre of mass")):
-            for number, kind in enumerate(kinds):
-                mine = [
-                    i
-                    for i, name in enumerate(expectation.segments)
-                    if name.removeprefix("right_").removeprefix("left_") == kind
-                ]
+            for number, kind in enumerate(kinds):  # both sides of a segment in one curve
+                bare = [name.removeprefix("right_").removeprefix("left_") for name in expectation.segments]
+                mine = [i for i, name in enumerate(bare) if name == kind]
                 share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
-                style = ("-", "--", ":")[number // len(colours) % 3]
-                colour = colours[number % len(colours)]
+                style, colour = ("-", "--", ":")[number // len(colours) % 3], colours[number % len(colours)]
                 axes.plot(expectation.duration, share, style, color=colour, label=spaced(kind))
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")
@@ -200,9 +190,7 @@ def _write(frames: "list[Image]", part: Path, out: Path) -> None:
 
 
 def _picture(body: Body, bodies: tuple[tuple[str, Array], ...], cop: Array, time: float, scale: float) -> "Image":
-    """Return one instant: the bodies (title, posture (nq,)) side by side, each from the front and from the right, the
-    first one, the plan, in pale colours; the centre of pressure in red; ``scale`` px per metre.
-    """
+    """Return one instant: bodies (title, posture) from both eyes, the plan pale, pressure red, ``scale`` px per m."""
     from PIL import Image, ImageDraw
 
     width, height = _SIZE[0] * _FINE, _SIZE[1] * _FINE

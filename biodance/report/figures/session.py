@@ -1,6 +1,4 @@
-"""Figures of a session: markers to the model, quiet standing from above, measured beside simulated wrench, and a 3-D
-still as a light drawing: measured markers, the body that was fitted to them, plates and forces.
-"""
+"""Figures of a session: markers to the model, quiet standing, measured beside simulated wrench, a 3-D still."""
 
 from collections.abc import Sequence
 from html import escape
@@ -49,6 +47,7 @@ _SQUARE = svg.Frame(width=390.0, height=240.0, left=48.0)
 def _turned(place: Array, standing: QuietStanding) -> Array:
     """Return lab points (..., 2) as millimetres to the subject's right and ahead, from the mean centre of pressure."""
     ahead = standing.forward
+    # ahead turned by -90 degrees about the vertical
     right = np.array([ahead[1], -ahead[0]])
     arm = place - np.nanmean(standing.cop, axis=0)
     return 1000 * np.stack([arm @ right, arm @ ahead], axis=-1)
@@ -84,6 +83,7 @@ def _surroundings(x: svg.Axis, y: svg.Axis, standing: QuietStanding) -> list[str
 def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[svg.Axis, svg.Axis]:
     """Return two axes of one scale about ``middle`` (2,) that reach at least ``reach`` to each side."""
     aspect = (_SQUARE.width - _SQUARE.left - _SQUARE.right) / _SQUARE.height
+    # one mm is as long on both axes: the longer side of the panel shows more
     wide, high = reach * max(aspect, 1.0), reach * max(1.0, 1 / aspect)
     return (
         svg.Axis(middle[0] - wide, middle[0] + wide, labels[0]),
@@ -92,9 +92,7 @@ def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[svg.A
 
 
 def standing_figure(standing: QuietStanding) -> str:
-    """Return centre of pressure, centre of mass, feet and plates in the subject's own axes, and beside it the middle,
-    enlarged.
-    """
+    """Return pressure, centre of mass, feet and plates in the subject's axes, and the middle, enlarged."""
     tracked = bool(standing.com.size)
     labels = ("to the subject's right (mm)", "ahead (mm)") if tracked else ("along lab −y (mm)", "along lab x (mm)")
     shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
@@ -118,12 +116,12 @@ def _channels(
     cells = []
     for channel in (0, 3, 1, 4, 2, 5):
         title, least = CHANNEL_TITLES[channel], _LEAST[channel]
-        drawn = [svg.Curve("measured", measured[:, channel], svg.MEASURED)]
-        drawn += [svg.Curve(name, np.where(used, value[:, channel], np.nan), look) for name, value, look in curves]
-        left = [
-            svg.Curve(name, np.where(used, measured[:, channel] - value[:, channel], np.nan), look)
-            for name, value, look in curves
-        ]
+        truth, left = measured[:, channel], []
+        drawn = [svg.Curve("measured", truth, svg.MEASURED)]
+        for name, value, look in curves:
+            known = np.where(used, value[:, channel], np.nan)
+            drawn.append(svg.Curve(name, known, look))
+            left.append(svg.Curve(name, truth - known, look))
         unit = title[title.index("(") :]
         cells.append(
             [svg.Strip(title, drawn, least), svg.Strip(f"measured − simulated {unit}", left, least / 2, even=True)]
@@ -132,9 +130,7 @@ def _channels(
 
 
 def wrench_figure(comparison: WrenchComparison, trial: str = "", *, filled: NDArray[np.bool_] | None = None) -> str:
-    """Return six channels, measured and simulated with the table, each over its residual; grey frames are left out, in
-    yellow ones posture rests on ``filled`` (T,) gaps.
-    """
+    """Return six channels, measured and by the table, over residuals; grey: left out, yellow: ``filled`` (T,)."""
     curves = [("with the table", comparison.simulated, svg.TABLE)]
     cells = _channels(curves, comparison.measured, comparison.used)
     about = "Measured and simulated ground wrench; the numbers are in the table below"
@@ -142,9 +138,7 @@ def wrench_figure(comparison: WrenchComparison, trial: str = "", *, filled: NDAr
 
 
 def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None = None) -> str:
-    """Return six channels, measured, with the table and with the identified parameters, each over its differences;
-    grey frames are left out, in yellow ones posture rests on ``filled`` (T,) gaps.
-    """
+    """Return six channels, measured, by table and identified, over differences; shades as `wrench_figure`."""
     curves = [("with the table", one.table.value, svg.TABLE), ("identified", one.identified.value, svg.IDENTIFIED)]
     about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
     cells = _channels(curves, one.measured.value, one.use)
@@ -161,14 +155,6 @@ VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 """Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""
 
 _MM = 1000.0
-
-
-def _rounded(box: Array) -> Array:
-    """Return points (n, 3) of the rounded solid that fills a ``box`` (2, 3) m."""
-    polar, around = np.meshgrid(np.linspace(0.0, np.pi, 15), np.linspace(0.0, 2 * np.pi, 28, endpoint=False))
-    ball = np.stack([np.sin(polar) * np.cos(around), np.cos(polar), np.sin(polar) * np.sin(around)], -1).reshape(-1, 3)
-    size = (np.abs(ball) ** ROUNDNESS).sum(axis=1, keepdims=True) ** (1 / ROUNDNESS)
-    return (box[0] + box[1]) / 2 + (box[1] - box[0]) / 2 * ball / size
 
 
 def _outline(points: Array, kind: str) -> str:
@@ -190,17 +176,21 @@ def _line(ends: Array, kind: str) -> str:
 
 
 def _dot(place: Array, radius: float, kind: str) -> str:
-    return (
-        f'<circle cx="{place[0]:.0f}" cy="{place[1]:.0f}" r="{radius:g}" {kind}/>' if np.isfinite(place).all() else ""
-    )
+    drawn = f'<circle cx="{place[0]:.0f}" cy="{place[1]:.0f}" r="{radius:g}" {kind}/>'
+    return drawn if np.isfinite(place).all() else ""
 
 
 def _body(still: Still, screen: Array) -> list[str]:
     """Return the segments' outlines, those behind first, and over them the bones."""
     skins = []
+    polar, around = np.meshgrid(np.linspace(0.0, np.pi, 15), np.linspace(0.0, 2 * np.pi, 28, endpoint=False))
+    ball = np.stack([np.sin(polar) * np.cos(around), np.cos(polar), np.sin(polar) * np.sin(around)], -1).reshape(-1, 3)
+    # a ball in the norm sum |x|^p = 1: nearly a box, its edges round
+    size = (np.abs(ball) ** ROUNDNESS).sum(axis=1, keepdims=True) ** (1 / ROUNDNESS)
     for box, turn, at, side in zip(still.boxes, still.rotations, still.positions, still.box_sides, strict=True):
         if np.all(box[1] > box[0]):
-            points = (_rounded(box) @ turn.T + at) @ screen
+            solid = (box[0] + box[1]) / 2 + (box[1] - box[0]) / 2 * ball / size
+            points = (solid @ turn.T + at) @ screen
             kind = f'fill="{SIDE_COLOURS[side][0]}" fill-opacity="0.18" stroke="none"'
             skins.append((float(points[:, 2].mean()), _outline(points[:, :2], kind)))
     bones = []
@@ -242,6 +232,7 @@ def still_figure(still: Still) -> str:
         shown = (points[np.isfinite(points).all(axis=1)] @ screen)[:, :2]
         body = (still.bones.reshape(-1, 3) @ screen)[:, :2]
         (left, top), (right, foot) = shown.min(axis=0) - 90, shown.max(axis=0) + 90
+        # plates far from the body are cut off, or it would be small
         middle, half = float(body[:, 0].mean()), 900.0
         left, right = max(left, middle - half), min(right, middle + half)
         foot = min(foot, float(body[:, 1].max()) + 500.0)

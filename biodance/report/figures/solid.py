@@ -30,10 +30,7 @@ SKIN = 0.3
 
 
 def sheet_png(stills: Sequence[Still]) -> bytes | None:
-    """Return one picture of all ``stills``, each titled by its ``trial``, as PNG bytes.
-
-    None where pyvista or GL is missing, or the child dies or is too slow.
-    """
+    """Return all ``stills``, titled by ``trial``, as PNG; None where pyvista or GL lacks, or the child dies."""
     if find_spec("pyvista") is None or not stills:
         return None
     try:
@@ -66,6 +63,7 @@ def _camera(plotter: Any, still: Still, height: float) -> None:
     low = points.min(axis=0)
     middle = (low + points.max(axis=0)) / 2
     middle[2] = low[2] + height / 2
+    # 12 degrees from above, 50 to the right of where the person looks
     up, around = np.radians(12.0), np.radians(-50.0) + np.arctan2(still.forward[1], still.forward[0])
     away = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
     plotter.camera_position = [middle + 5.8 * away, middle, (0.0, 0.0, 1.0)]

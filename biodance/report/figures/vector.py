@@ -42,6 +42,7 @@ class Stroke:
 MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(GREY, "6 3"), Stroke(GREEN, "2 2", 1.6)
 """No side of the body: blue is right, red left alone."""
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
+SIDE_STROKES = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "middle": MIDDLE_SIDE}
 
 
 @dataclass(frozen=True)
@@ -71,23 +72,22 @@ class Axis:
 
 
 def around(values: NDArray[Any], *, least: float = 0.0, label: str = "") -> Axis:
-    """Return an axis that holds all finite ``values`` with a little room on each side, no shorter than ``least``;
-    0 to 1 where there is none.
-    """
+    """Return an axis about all finite ``values``, no shorter than ``least``; 0 to 1 where there is none."""
     seen = values[np.isfinite(values)]
     low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    # half of what it spans, and 6 % of it as room at both ends
     half = max(0.56 * (high - low), least / 2) or 0.5
     return Axis((low + high) / 2 - half, (low + high) / 2 + half, label)
 
 
 def round_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
-    """Return about ``count`` round values between ``low`` and ``high`` with their text; two at least, for a single one
-    tells no scale.
-    """
+    """Return about ``count`` round values from ``low`` to ``high`` with their text: two, for one has no scale."""
+    # the smallest of 1, 2, 5, 10 times a power of ten that makes at most ``count`` steps
     rough = (high - low) / max(count, 1)
     ten = 10.0 ** np.floor(np.log10(rough))
     coarse = (10, 5, 2, 1, 0.5, 0.2, 0.1)
     start = next(i for i in reversed(range(4)) if ten * coarse[i] >= 0.999 * rough)
+    # finer while fewer than two ticks lie within
     for step in (ten * k for k in coarse[start:]):
         first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
         if last > first:
@@ -97,11 +97,10 @@ def round_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
 
 
 def envelope(values: Array) -> NDArray[np.int64]:
-    """Return the indices (n,) of ``values`` (T,) that a curve needs: all, or of every place along a long one the
-    lowest and the highest.
-    """
+    """Return the indices (n,) that a curve of ``values`` (T,) needs: of a long one each place's lowest and highest."""
     if values.size <= 2 * _PLACES:
         return np.arange(values.size)
+    # (places, size) indices; the last one of a shorter place is repeated
     edges = np.linspace(0, values.size, _PLACES + 1).astype(int)
     size = int(np.diff(edges).max())
     index = np.minimum(edges[:-1, None] + np.arange(size), edges[1:, None] - 1)
@@ -114,15 +113,14 @@ def envelope(values: Array) -> NDArray[np.int64]:
 
 def path(across: NDArray[np.int64], down: NDArray[np.int64]) -> str:
     """Return one line through points in steps, as an SVG path with steps from point to point."""
+    # relative steps are short numbers; a minus sign needs no space before it
     moved = np.stack([np.diff(across), np.diff(down)], axis=1).ravel().tolist()
     start = f"M{across[0]} {down[0]}"
     return f"{start}l{' '.join(map(str, moved))}".replace(" -", "-") if moved else f"{start}h0"
 
 
 def curve_line(x: Axis, y: Axis, at: Array, values: Array, look: Stroke, *, name: str = "", kind: str = "line") -> str:
-    """Return a curve of ``values`` (T,) over ``at`` (T,), broken where a value is not finite; ``name`` for the legend's
-    button, ``kind`` its class.
-    """
+    """Return a curve of ``values`` (T,) over ``at`` (T,), broken at NaN; ``name`` of its button, ``kind`` its class."""
     chosen = envelope(values)
     across, held = x.steps(at[chosen]), values[chosen]
     finite = np.isfinite(held)
@@ -137,6 +135,7 @@ def band(x: Axis, y: Axis, at: Array, low: Array, high: Array, colour: str, *, n
     across, finite = x.steps(at[chosen]), np.isfinite(low[chosen] + high[chosen])
     below, above = (STEPS - y.steps(np.where(finite, v[chosen], 0.0)) for v in (low, high))
     d = "".join(
+        # along the upper edge, and back along the lower one
         path(np.concatenate([across[a:b], across[a:b][::-1]]), np.concatenate([above[a:b], below[a:b][::-1]])) + "z"
         for a, b in runs(finite)
         if b - a > 1
@@ -184,9 +183,7 @@ def segments(x: Axis, y: Axis, way: Array, look: Stroke) -> str:
 
 @dataclass(frozen=True)
 class Frame:
-    """Size of a panel in px as drawn on a wide page: the plot's ``height`` and the whole ``width``, and the room for
-    the words ``left`` of the plot and ``below`` it.
-    """
+    """px of a panel on a wide page: the whole ``width``, the plot's ``height``, and the room for words around it."""
 
     width: float = 390.0
     height: float = 110.0

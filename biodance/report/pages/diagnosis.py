@@ -1,6 +1,4 @@
-"""The pages on causes for the analyst: of a diagnosis (what is wrong, how we know, how big, how sure, what else, what
-to do, what changes), and of what a planned movement will see.
-"""
+"""The pages on causes for the analyst: of a diagnosis, and of what a planned movement will see."""
 
 from html import escape
 from typing import Any
@@ -13,9 +11,9 @@ from biodance.diagnosis.diagnosis import Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
-from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import Provenance, now
+from biodance.pipeline.words import first_upper
 from biodance.records import CHANNEL_TITLES, CHANNELS, grouped
 from biodance.report import wording
 from biodance.report.figures import vector as svg
@@ -37,30 +35,17 @@ def left_figure(left: tuple[Residuals, Residuals]) -> str:
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     time = np.arange(len(before)) / rate
-    cells = [
-        [
-            svg.Strip(
-                CHANNEL_TITLES[k],
-                [
-                    svg.Curve(name, np.where(use, value[:, k], np.nan), look)
-                    for name, value, look in (
-                        ("as it is", before, svg.LEFT_SIDE),
-                        ("findings accepted", after, svg.RIGHT_SIDE),
-                    )
-                ],
-            )
-        ]
-        for k in (0, 3, 1, 4, 2, 5)
-    ]
-    return svg.CurveFigure(
-        time, cells, "Measured minus simulated wrench; the numbers are in the table above", use
-    ).html()
+    drawn = (("as it is", before, svg.LEFT_SIDE), ("findings accepted", after, svg.RIGHT_SIDE))
+    cells = []
+    for k in (0, 3, 1, 4, 2, 5):
+        curves = [svg.Curve(name, np.where(use, value[:, k], np.nan), look) for name, value, look in drawn]
+        cells.append([svg.Strip(CHANNEL_TITLES[k], curves)])
+    about = "Measured minus simulated wrench; the numbers are in the table above"
+    return svg.CurveFigure(time, cells, about, use).html()
 
 
 def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
-    """Return what is left per channel and speed of movement, in standard deviations of sessions without fault, as a
-    table; darker: further away.
-    """
+    """Return what is left by channel and band, in sd of sessions without fault, the darker the further."""
     bands = sorted({row.band_hz for row in rows})
     value = {(row.channel, row.band_hz): row.z for row in rows}
     head = "".join(f'<th scope="col">{"rest" if low == 0 else f"{low:g}–{high:g} Hz"}</th>' for low, high in bands)
@@ -72,13 +57,11 @@ def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
             if not np.isfinite(z):
                 cells.append("<td>–</td>")
                 continue
-            dark = min(max(z, 0.0) / (2 * LIMIT), 1.0)
-            grey, white = round(255 - 185 * dark), z > LIMIT
+            # white at 0 sd, darkest at twice the limit and above
+            grey, said = round(255 - 185 * min(max(z, 0.0) / (2 * LIMIT), 1.0)), wording.format_number(z, 0)
             cells.append(
                 f'<td class="n" style="background:rgb({grey},{grey},{grey});color:{"#fff" if grey < 130 else "#000"}">'
-                f"{f'<strong>{z:.0f}</strong>' if white else f'{z:.0f}'}</td>".replace(">-0<", ">0<").replace(
-                    ">-", ">−"
-                )
+                f"{f'<strong>{said}</strong>' if z > LIMIT else said}</td>"
             )
         lines.append(f'<tr><th scope="row">{escape(channel)}</th>{"".join(cells)}</tr>')
     caption = "Standard deviations of sessions without a fault"
@@ -89,9 +72,7 @@ def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
 
 
 def limits_figure(rows: tuple[Unobservable, ...]) -> str:
-    """Return per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of
-    its places.
-    """
+    """Return by cause from which size on it is seen, in typical sizes: the best and worst of its places."""
     kinds = grouped((row.effect, row.limit / row.typical) for row in rows)
     order = sorted(kinds, key=lambda name: -np.median(kinds[name]))
     words = ((0.01, "1 %"), (0.1, "a tenth"), (1.0, "typical size"), (10.0, "ten times"))
@@ -99,6 +80,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     y = svg.Axis(-0.6, len(order) - 0.4, "", tuple((float(i), spaced(name)) for i, name in enumerate(order)))
     marks = [svg.rule(x, 1.0, upright=True, look=svg.Stroke(BLACK, "", 0.9))]
     for i, name in enumerate(order):
+        # "never" is infinite, and a logarithmic axis has an end: drawn at the edge
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
         marks.append(svg.segments(x, y, np.array([[value.min(), i], [value.max(), i]]), svg.Stroke(GREY, "", 2.5)))
         marks.append(svg.points(x, y, np.median(value), i, svg.Stroke(BLUE)))
@@ -147,7 +129,7 @@ def how_sure(one: Finding) -> str:
     """Return how sure a finding is: its probability and its odds against nothing wrong, or that a check shows it."""
     said = odds(one.log_bayes_factor)
     if not np.isfinite(one.log_bayes_factor):
-        return f"{wording.first_upper(said)}."
+        return f"{first_upper(said)}."
     return f"{probable(one.probability)}; {said}."
 
 
@@ -173,8 +155,8 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     witnesses = _witnesses(one.witnesses)
     witnessed = {(row["effect"], row["target"]) for row in witnesses["seen"]} if witnesses else set()
     blind = LIMIT_ROW.rows(row for row in one.unobservable if (row.effect, row.target) not in witnessed)
+    # what no observation sees either, apart by whether any size of it would be seen
     never = [row for row in blind if wording.size_seen(row["limit"], row["typical"], row["unit"]) == wording.NEVER]
-    made = f"biodance {provenance.versions['biodance']}, {wording.moment(provenance.created)}"
     return render(
         "diagnosis.html.j2",
         filters={
@@ -183,13 +165,18 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
             "how_sure": how_sure,
             "probable": probable,
             "share": wording.share_of,
-            "first_upper": wording.first_upper,
+            "first_upper": first_upper,
             "spaced": spaced,
         },
         scripts=[template_text("curves.js")],
-        sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
+        sheet=print_sheet(f"Session {result.session.folder.name}", provenance.visit, provenance.created),
         named=cause_in_words,
-        schemas={"limit": LIMIT_ROW, "observed": OBSERVED_ROW, "visibility": VISIBILITY_ROW, "mass": _MASS},
+        schemas={
+            "limit": LIMIT_ROW,
+            "observed": OBSERVED_ROW,
+            "visibility": VISIBILITY_ROW,
+            "mass": _MASS,
+        },
         unseen=[row for row in blind if row not in never],
         never=wording.causes_by_effect((row["effect"], row["target"]) for row in never),
         result=result,

@@ -39,9 +39,7 @@ _LIMBS, _TRUNK = 0.6, 0.25
 
 
 def follow_scene(dance: Dance) -> dict[str, Any] | None:
-    """Return what the page needs to follow a person through ``dance`` as plain values; None for a body whose joints the
-    camera does not know, such as a robot's.
-    """
+    """Return what follows a person through ``dance``; None for a body whose joints no camera knows (a robot)."""
     body, points = dance.body, _points(dance.body)
     if not points or not body.n_root:
         return None
@@ -79,9 +77,7 @@ def _packed(values: ArrayLike, kind: str = "<f4") -> str:
 
 
 def _points(body: Body) -> list[dict[str, Any]]:
-    """Return the points of the body that the camera finds: ``name``, ``number`` among those of MoveNet, ``segment`` and
-    ``place`` m in its frame, ``asks`` how readily it is corrected; none when the body lacks one.
-    """
+    """Return the body's points that the camera finds, by the numbers of MoveNet, and how readily each is corrected."""
     out = []
     for second, side in enumerate(("left", "right")):
         for part, name in _POINTS.items():
@@ -95,14 +91,9 @@ def _points(body: Body) -> list[dict[str, Any]]:
             return []
         place = body.markers.position[wrist].mean(axis=0)
         out.append((f"{side} wrist", body.markers.segment[wrist[0]], place, "wrist", second))
+    keys = ("name", "number", "segment", "place", "asks")
     return [
-        {
-            "name": called,
-            "number": _NUMBERS[name] + second,
-            "segment": int(segment),
-            "place": place,
-            "asks": _ASKED.get(name, 0.0),
-        }
+        dict(zip(keys, (called, _NUMBERS[name] + second, int(segment), place, _ASKED.get(name, 0.0)), strict=True))
         for called, segment, place, name, second in out
     ]
 
@@ -141,6 +132,7 @@ def scene_of(dance: Dance, say: Say = in_english) -> dict[str, Any]:
         )
     turn = Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(*place.shape[:2], 4)
     placed = np.round(np.concatenate([place, 32767 * turn], axis=2))
+    named = [(body.segments[k], parents[k]) for k in chosen]
     return {
         "name": dance.protocol,
         "duration_s": dance.duration,
@@ -150,11 +142,11 @@ def scene_of(dance: Dance, say: Say = in_english) -> dict[str, Any]:
             {
                 "name": name,
                 "side": side_in_name(name, ""),
-                "parent": chosen.index(parents[k]) if parents[k] in chosen else -1,
+                "parent": chosen.index(parent) if parent in chosen else -1,
                 "vertices": _packed(solids[name].vertices),
                 "faces": _packed(solids[name].faces, "<u2"),
             }
-            for k, name in ((k, body.segments[k]) for k in chosen)
+            for name, parent in named
         ],
         "poses": _packed(placed, "<i2"),
         "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4),
@@ -174,27 +166,21 @@ def _cues(dance: Dance, say: Say) -> list[dict[str, Any]]:
     said, pauses = dance_instructions(dance, say), rests(dance)
     holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
     moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
-    out = []
-    for p, stance in enumerate(dance.stances):
-        start = moves[p].start if p in moves else 0.0
-        held = holds[p].start if p in holds else moves[p].end
-        out.append(
-            {
-                "number": p + 1,
-                "move_s": start,
-                "hold_s": held,
-                "end_s": holds[p].end if p in holds else held,
-                "calls": list(said[p]),
-                "after_skips": [
-                    list(skipping(dance, p, p - n, say)) for n in range(2, 5) if _same_feet(dance, p, p - n)
-                ],
-                "can_half": _same_feet(dance, p, p - 1),
-                "rest": pauses[p],
-                "stance": say(stance_words(stance)),
-                "feet": [_outline(stance, side) for side in stance.planted],
-            }
-        )
-    return out
+    return [
+        {
+            "number": p + 1,
+            "move_s": moves[p].start if p in moves else 0.0,
+            "hold_s": holds[p].start if p in holds else moves[p].end,
+            "end_s": holds[p].end if p in holds else moves[p].end,
+            "calls": list(said[p]),
+            "after_skips": [list(skipping(dance, p, p - n, say)) for n in range(2, 5) if _same_feet(dance, p, p - n)],
+            "can_half": _same_feet(dance, p, p - 1),
+            "rest": pauses[p],
+            "stance": say(stance_words(stance)),
+            "feet": [_outline(stance, side) for side in stance.planted],
+        }
+        for p, stance in enumerate(dance.stances)
+    ]
 
 
 def _same_feet(dance: Dance, p: int, before: int) -> bool:
@@ -206,6 +192,7 @@ def _same_feet(dance: Dance, p: int, before: int) -> bool:
 def _outline(stance: Stance, side: int) -> Array:
     """Return the outline of a planted sole on the floor, (P, 2) m, in order about its middle."""
     points = stance.soles[side][:, :2]
+    # a sole is convex: its corners in order of their angle about the middle are its outline
     from_middle = points - points.mean(axis=0)
     order = np.argsort(np.arctan2(from_middle[:, 1], from_middle[:, 0]))
     return points[order].round(4)
@@ -259,9 +246,7 @@ def feedback_page(
     care: tuple[str, ...] = (),
     words: Language | None = None,
 ) -> str:
-    """Return the page of a dance as HTML text: what it shows (`scene_of`), what follows the person, or None, in what
-    it is not safe, what is to be taken care of, and in which language (None: English).
-    """
+    """Return a dance's page: `scene_of`, what follows the person or None, what is not safe, care, language."""
     from markupsafe import Markup
 
     words = words or read_language()

@@ -70,6 +70,7 @@ def _beside(paper: Identification | None, name: str, times: float = 1.0) -> dict
 def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load: _Load = None) -> str:
     """Return one panel: a row for each segment."""
     ends = np.array([v for row in rows for v in (*row.before, *row.after, beside.get(row.name, row.after[0]))])
+    # some room at both ends; an axis of masses does not go below zero for it
     room, least = 0.04 * float(np.ptp(ends)), -np.inf if ends.min() < 0 else 0.0
     x = svg.Axis(max(least, float(ends.min()) - room), float(ends.max()) + room, label)
     ticks = tuple((len(rows) - 1.0 - i, spaced(row.name)) for i, row in enumerate(rows))
@@ -102,9 +103,7 @@ _PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along t
 
 
 def changes_figure(changes: tuple[Difference, ...], certain: tuple[Difference, ...]) -> str:
-    """Return what changed in every segment, later less earlier, with 95 % intervals: orange what is ``certain``, open
-    where nothing is known.
-    """
+    """Return what changed in every segment, later less earlier, with intervals: orange ``certain``, open unknown."""
     names = list(dict.fromkeys(row.segment for row in changes))
     ticks = tuple((len(names) - 1.0 - i, spaced(name)) for i, name in enumerate(names))
     y, drawn = svg.Axis(-0.6, len(names) - 0.4, "", ticks), []
@@ -135,9 +134,7 @@ _RANKED = 15  # Quantities that the figure of pulls and impacts shows
 
 
 def impact_figure(found: Sequence[Impact]) -> str:
-    """Return the quantities with the largest impact: left the pull from the prior with what is left of its standard
-    deviation, right what that does to the moments of knee (green) and hip (pink ring).
-    """
+    """Return the largest impacts: pull from the prior with what is left of it, and moments of knee and hip."""
     rows = list(found[:_RANKED])
     ticks = tuple((len(rows) - 1.0 - i, spaced(f"{row.segment} {row.quantity}")) for i, row in enumerate(rows))
     y = svg.Axis(-0.6, len(rows) - 0.4, "", ticks)
@@ -149,17 +146,13 @@ def impact_figure(found: Sequence[Impact]) -> str:
     right = []
     for (at, _), row in zip(ticks, rows, strict=True):
         ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
-        left += [
-            svg.segments(pulled, y, ends, svg.Stroke(BLACK)),
-            svg.points(pulled, y, row.pull, at, svg.Stroke(BLACK)),
-        ]
-        knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
-        right += [
-            svg.segments(moment, y, knee, svg.Stroke(GREEN, "", 2.0)),
-            svg.segments(moment, y, hip, svg.Stroke(PINK, "4 2", 2.0)),
-        ]
-        right += [svg.points(moment, y, row.knee, at + 0.16, svg.Stroke(GREEN))]
-        right += [svg.points(moment, y, row.hip, at - 0.16, svg.Stroke(PINK), inside="#fff")]
+        black, knee, hip = svg.Stroke(BLACK), at + 0.16, at - 0.16
+        left += [svg.segments(pulled, y, ends, black), svg.points(pulled, y, row.pull, at, black)]
+        ways = (np.array([[0.0, up], [size, up]]) for up, size in ((knee, row.knee), (hip, row.hip)))
+        looks = (svg.Stroke(GREEN, "", 2.0), svg.Stroke(PINK, "4 2", 2.0))
+        right += [svg.segments(moment, y, way, look) for way, look in zip(ways, looks, strict=True)]
+        right.append(svg.points(moment, y, row.knee, knee, svg.Stroke(GREEN)))
+        right.append(svg.points(moment, y, row.hip, hip, svg.Stroke(PINK), inside="#fff"))
     frame = svg.Frame(height=ROW * len(rows), left=138.0, above=4.0)
     pulls = svg.panel(pulled, y, left, "pull of every quantity", frame=frame)
     impacts = svg.panel(moment, y, right, "impact on knee and hip", frame=frame)
@@ -176,12 +169,8 @@ def drawn_joints(bands: TorqueBands) -> list[tuple[str, list[tuple[int, str]]]]:
     """Return what is drawn: title, and index and side ("right", "left", "") of the joints in one panel."""
     found = []
     for kind in _SHOWN:
-        named = [
-            (bands.joints.index(name), side)
-            for side in _SIDES
-            if (name := f"{side}_{kind}".lstrip("_")) in bands.joints
-        ]
-        if named:
+        names = ((f"{side}_{kind}".lstrip("_"), side) for side in _SIDES)
+        if named := [(bands.joints.index(name), side) for name, side in names if name in bands.joints]:
             found.append((spaced(kind), named))
     return found
 
@@ -257,6 +246,7 @@ def identification_section(found: SessionIdentification) -> str:
     from markupsafe import Markup
 
     one, sure = found.identification, certain_changes(found.changes)
+    # beside the paper's programme the figures show the posterior, which alone has intervals
     drawn, paper = (found.posterior.identification, one) if found.posterior else (one, None)
     carried = (found.search.best.segment, found.search.best.mass) if found.search.found else None
     rows, logs = tables.segments_document(one), found.performance.logs if found.performance else ()

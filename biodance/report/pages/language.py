@@ -56,9 +56,8 @@ class Language:
 
     def number(self, value: float, digits: int = 0) -> str:
         """Return a number with so many ``digits`` after the decimal sign."""
-        return format_decimal(
-            round(float(value), digits), format=f"#,##0.{digits * '0'}".strip("."), locale=self.locale
-        )
+        form = f"#,##0.{digits * '0'}".strip(".")
+        return format_decimal(round(float(value), digits), format=form, locale=self.locale)
 
     def short(self, value: float, digits: int = 1) -> str:
         """Return a number with at most so many ``digits`` after the decimal sign, without zeros at its end."""

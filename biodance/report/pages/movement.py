@@ -22,12 +22,13 @@ from biodance.cycles.summary import (
 )
 from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.words import first_upper
 from biodance.records import SIDES
 from biodance.report.figures.cycles import GROUND_PANELS, consistency_figure, pressure_figure, repetitions_figure
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import FILE_ANGLE_ROW
-from biodance.report.wording import first_upper, format_number
+from biodance.report.wording import format_number, millimetres
 
 CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair", "jump": "Jumps"}
 _UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat", "jump": "take-off"}
@@ -66,7 +67,7 @@ def movement_section(moved: SessionMovement) -> str:
     beside = bool(moved.gait and moved.gait.file_curves)
     return render(
         "movement.html.j2",
-        filters={"milli": _milli, "beside": _beside, "first_upper": first_upper},
+        filters={"beside": _beside, "first_upper": first_upper},
         schemas={
             "strides": _STRIDES,
             "keys": _FILE_KEYS if beside else _KEYS,
@@ -86,11 +87,8 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> dict[str, Any]:
     """Return all repetitions of one kind as the page shows them: what is drawn ("" nothing), and rows of tables."""
     title = "Running" if found.runs else CYCLE_KINDS[found.kind]
     rows = {one.name: _key(one) for one in found.keys}
-    first = (
-        _FIRST
-        if found.kind == "gait"
-        else tuple(one.name for one in found.keys if one.key == "range" and not one.middle)
-    )
+    ranges = tuple(one.name for one in found.keys if one.key == "range" and not one.middle)
+    first = _FIRST if found.kind == "gait" else ranges
     ground = repetitions_figure(found, GROUND_PANELS, f"{title}: ground reaction, left beside right", normal)
     muscles = tuple(dict.fromkeys(one.quantity for one in found.groups if one.quantity.endswith(EMG)))
     both, left, right = (found.spatiotemporal(side) for side in ("both", "left", "right"))
@@ -123,12 +121,10 @@ def _told(found: Repetitions, values: Mapping[str, Spread]) -> str:
     counts = Counter(one.side for one in found.good)
     sides = ", ".join(f"{counts[side]} {side}" for side in SIDES if counts[side])
     trials = f"{len(found.trials)} trial{'s' * (len(found.trials) != 1)}"
-    number = f"{sides} {_COUNTED[found.kind]}" if sides else f"{len(found.good)} {_COUNTED[found.kind]}"
-    pace = ""
+    number, pace = f"{sides or len(found.good)} {_COUNTED[found.kind]}", ""
     if "speed" in values:
-        pace = (
-            f"{format_number(values['speed'].mean, 2)} m/s, {format_number(values['cadence'].mean, 0)} steps a minute: "
-        )
+        speed, cadence = format_number(values["speed"].mean, 2), format_number(values["cadence"].mean, 0)
+        pace = f"{speed} m/s, {cadence} steps a minute: "
     return f"{pace}{number} of {trials}."
 
 
@@ -193,10 +189,6 @@ def _score(name: str, found: Mapping[str, Spread]) -> Row:
     return {"value": name, **{side: _said(found.get(side), "deg") for side in SIDES}}
 
 
-def _milli(value: float) -> str:
-    return format_number(1000 * value, 0)
-
-
 def _beside(late: float) -> str:
     """Return how much later than the file's ours are: ``6 ms earlier``."""
-    return f"{_milli(abs(late))} ms {'later' if late > 0 else 'earlier'}"
+    return f"{millimetres(abs(late), 0)} ms {'later' if late > 0 else 'earlier'}"

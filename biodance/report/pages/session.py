@@ -17,7 +17,7 @@ from biodance.identification.validation import TrialValidation
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import Provenance
-from biodance.pipeline.session_frames import SessionReplay, TrialReplay
+from biodance.pipeline.still import SessionReplay, TrialReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS, AngleState, Array
 from biodance.records.attention import Attention
@@ -34,7 +34,7 @@ from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import packed_numbers, print_sheet, render, script_json, template_text, three_js
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import GAP_ROW
-from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres, moment
+from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres
 
 
 def replay_data(found: SessionReplay) -> str:
@@ -46,11 +46,9 @@ def replay_data(found: SessionReplay) -> str:
     centre of mass and the two centres of pressure, ``turns`` (x y z w in 1/32767), ``forces`` measured, simulated and
     left in 0.1 N; ``state`` one digit a frame, `AngleState`.
     """
+    boxes = zip(found.boxes.round(4), found.on, found.sides, strict=True)
     scene = {
-        "boxes": [
-            {"on": on, "side": side, "low": low.round(4), "high": high.round(4)}
-            for (low, high), on, side in zip(found.boxes, found.on, found.sides, strict=True)
-        ],
+        "boxes": [{"on": on, "side": side, "low": low, "high": high} for (low, high), on, side in boxes],
         "load": None if found.load is None else {"on": found.load[0], "place": found.load[1].round(4)},
         "force_scale": FORCE_SCALE,
         "residual_scale": RESIDUAL_SCALE,
@@ -64,6 +62,7 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
         [one.positions, one.markers, one.com[:, None], one.measured[:, 1:], one.simulated[:, 1:]], axis=1
     )
     origin = np.nanmean(one.com, axis=0)
+    # whole numbers of 16 bits: the segment furthest from the origin is at most 30,000 steps away
     unit = max(1e-4, float(np.nanmax(np.abs(one.positions - origin))) / 30000)
     forces = np.stack([one.measured[:, 0], one.simulated[:, 0], one.residual], axis=1)
     return {
@@ -110,11 +109,8 @@ def key_figures(result: SessionResult) -> list[Tile]:
     tiles = []
     if result.weighed:
         declared = result.declared_mass
-        beside = (
-            f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
-            if declared == declared
-            else "none declared"
-        )
+        beside = f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
+        beside = beside if np.isfinite(declared) else "none declared"
         outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)
         tiles.append(Tile("Mass on the plates", f"{format_number(result.weighed.mass, 2)} kg", beside, not outside))
     for start, what in (
@@ -151,13 +147,10 @@ class TrialPart:
     def said(self) -> list[str]:
         """What was decided when the trial was read and prepared, each sentence once."""
         trial = self.result.trial
-        plates = [
-            f"{plate.name}: {line}"
-            for plate in trial.plates
-            for line in plate.decisions
-            if not any(line in h for h in trial.history)
-        ]
-        return [*trial.history, *plates]
+        lines = ((plate.name, line) for plate in trial.plates for line in plate.decisions)
+        # a reader's history repeats some of what it decided on plates
+        told = [f"{name}: {line}" for name, line in lines if not any(line in said for said in trial.history)]
+        return [*trial.history, *told]
 
     @property
     def channels(self) -> list[tuple[str, str, float, float]]:
@@ -191,17 +184,12 @@ def _apart(value: float, above: str, below: str) -> str:
 
 def _contents(inner: str, *, replayed: bool) -> list[tuple[str, str]]:
     """Return address and title of every section of the page, of which ``inner`` holds those in the middle."""
-    found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
     last = {"checks": "Quality checks", "standing": "Quiet standing", "trials": "Trials", "made": "How it was made"}
+    found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
     first = [(where, unescape(title)) for where, title in found]
     seen = [*(one for one in first if one[0] == "movement"), *([("replay", "Replay")] if replayed else [])]
-    return [
-        *seen,
-        ("figures", "Forces and masses"),
-        *(one for one in first if one not in seen),
-        ("body", "The body"),
-        *last.items(),
-    ]
+    others = [one for one in first if one not in seen]
+    return [*seen, ("figures", "Forces and masses"), *others, ("body", "The body"), *last.items()]
 
 
 _UNFOLDED = {"verdict", "movement", "replay", "figures", "masses"}
@@ -239,7 +227,6 @@ def page(
     identified = identification_section(found) if found else ""
     worst = result.more_stills[0] if result.more_stills else result.still
     others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
-    name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     whole = render(
         "page.html.j2",
         filters={"place": _place, "apart": _apart},
@@ -247,7 +234,7 @@ def page(
         scripts=[template_text("curves.js"), *((three_js(), template_text("replay.js")) if replay else ())],
         replay=Markup(replay_data(replay)) if replay else "",
         loaded=bool(replay and replay.load),
-        sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
+        sheet=print_sheet(f"Session {result.session.folder.name}", provenance.visit, provenance.created),
         headline=headline_of(said),
         attention=loud,
         noted=noted,

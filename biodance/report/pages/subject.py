@@ -26,9 +26,7 @@ _SIDES = {"right": N_("Right"), "left": N_("Left")}
 
 
 def plain_movement(found: Repetitions, words: Language) -> dict[str, Any]:
-    """Return how somebody moved, by all good repetitions of one kind: ``title``, sentences ``said``, ``rows`` (what,
-    left, right), ``picture`` as SVG ("" none).
-    """
+    """Return how somebody moved: ``title``, sentences ``said``, ``rows`` (what, left, right), ``picture``."""
     if found.kind == "gait":
         title = words.say("How you ran") if found.runs else words.say("How you walked")
         said, rows = _walk(found, words), _steps(found, words)
@@ -66,14 +64,11 @@ def _walk(found: Repetitions, words: Language) -> list[str]:
     values, counts = found.spatiotemporal(), [sum(one.side == side for one in found.good) for side in SIDES]
     if "speed" not in values:
         return []
-    went = (
-        N_("You ran %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
-        if found.runs
-        else N_("You walked %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
-    )
+    ran = N_("You ran %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
+    walked = N_("You walked %(speed)s metres in a second. That is %(pace)s kilometres an hour.")
     speed, (right, left) = values["speed"].mean, (words.number(one) for one in counts)
     return [
-        words.say(went, speed=words.number(speed, 1), pace=words.number(3.6 * speed, 1)),
+        words.say(ran if found.runs else walked, speed=words.number(speed, 1), pace=words.number(3.6 * speed, 1)),
         words.say("You made %(number)s steps in a minute.", number=words.number(values["cadence"].mean)),
         words.say(
             "We looked at %(right)s steps with the right foot and %(left)s with the left.", right=right, left=left
@@ -104,11 +99,9 @@ def _knees(knee: KeySummary, words: Language) -> str:
     size = abs(knee.difference)
     if size < 0.5:
         return words.say("Your two knees bend equally far, to less than one degree.")
-    if knee.difference > 0:
-        more = N_("Your right knee bends %(number)s degrees more than the other one.")
-    else:
-        more = N_("Your left knee bends %(number)s degrees more than the other one.")
-    return words.say(more, number=words.number(size))
+    right = N_("Your right knee bends %(number)s degrees more than the other one.")
+    left = N_("Your left knee bends %(number)s degrees more than the other one.")
+    return words.say(right if knee.difference > 0 else left, number=words.number(size))
 
 
 def _knee_curves(found: Repetitions, words: Language) -> str:
@@ -120,7 +113,7 @@ def _knee_curves(found: Repetitions, words: Language) -> str:
     along = words.say("from one step to the next of the same foot") if gait else words.say("from start to end")
     x = svg.Axis(0.0, 100.0, along, ())
     y = svg.around(np.concatenate(list(means.values())), least=20.0, label=words.say("bend of the knee (degrees)"))
-    looks = {"right": svg.RIGHT_SIDE, "left": svg.LEFT_SIDE}
+    looks = svg.SIDE_STROKES
     marks = [svg.curve_line(x, y, PERCENT, means[side], looks[side], name=words.say(_SIDES[side])) for side in SIDES]
     about = words.say("How far each knee bends, right and left.")
     return svg.panel(x, y, marks, about, frame=svg.Frame(width=480.0, height=150.0))
@@ -132,9 +125,7 @@ _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
 
 @dataclass(frozen=True)
 class _Room:
-    """mm (of a body of 1.75 m) from the middle to the ``column`` of labels, between two of them, to the picture's edge
-    (``half``), and the size of the ``letters``.
-    """
+    """mm (of a body of 1.75 m) to the ``column`` of labels, between two, to the edge (``half``), and of ``letters``."""
 
     column: float = 620
     step: float = 130
@@ -146,10 +137,9 @@ _WIDE, _PHONE = _Room(), _Room(430, 110, 1150, 85)
 
 
 def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str], *, room: _Room = _WIDE) -> str:
-    """Draw ``body`` from the front, its right side on the left, as SVG text; ``labels`` (segment -> lines of text)
-    beside it, in the ``room`` they have; segments in ``measured`` are filled, the others white with a broken outline.
-    """
+    """Draw ``body`` from the front with ``labels`` (segment -> lines); white is what was not ``measured``."""
     front = silhouettes(body, _spread(body), (1.0, 0.0))
+    # whole mm, and y downwards as in a picture
     outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline, _ in front]
     marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
     middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
@@ -176,8 +166,7 @@ _BROKEN = 'fill="white" stroke-dasharray="18 10"'
 def _spread(body: Body) -> Array:
     """Return the posture (nq,) with arms and legs a little away from the body."""
     q = np.array(body.neutral)
-    for i, joint in enumerate(body.joints):
-        q[body.nq - len(body.joints) + i] = _SPREAD.get(joint.name.split("_", 1)[1], 0.0)
+    q[body.nq - len(body.joints) :] = [_SPREAD.get(joint.name.split("_", 1)[1], 0.0) for joint in body.joints]
     return q
 
 
@@ -187,6 +176,7 @@ def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: _Room
     own.sort(key=lambda name: middles[name][1])
     x, anchor, last, found = (-room.column if right else room.column), "end" if right else "start", -np.inf, []
     for name in own:
+        # beside its part, or a step below the label before it
         last = max(float(middles[name][1]), last + room.step)
         to, lines = middles[name], labels[name].split("\n")
         found.append(f'<path d="M{x * 0.98:g} {last:g}L{to[0]:g} {to[1]:g}" stroke="{GREY}" stroke-width="4"/>')

@@ -33,12 +33,8 @@ _LIBRARY = re.compile(r"<script>(/\*\*\s*\* @license[^/]*\*/\n[^\n]{100000,})\n"
 
 @cache
 def three_js() -> str:
-    """Return the text of three.js with its licence notice, as trimesh carries it for its own viewer.
-
-    Raises
-    ------
-    BiodanceError
-        The installed trimesh carries none.
+    """Return the text of three.js with its licence notice, as trimesh carries it for its own viewer. Raises
+    BiodanceError: the installed trimesh carries none.
     """
     found = find_spec("trimesh")
     place = Path(found.origin if found and found.origin else "trimesh").parent / "resources/templates/viewer.zip"
@@ -78,9 +74,7 @@ def template_text(name: str) -> str:
 def html_table(
     schema: Schema, rows: Iterable[Row], caption: str = "", *, only: Iterable[str] | None = None, narrow: bool = True
 ) -> "Markup":
-    """Return rows as an HTML table, as their schema shows them: ``only`` the columns of these headings where they are
-    given; ``narrow`` as wide as its text.
-    """
+    """Return rows as an HTML table, as their schema shows them, ``only`` some columns; ``narrow`` as their text."""
     from markupsafe import Markup
 
     headings = list(schema.columns if only is None else only)
@@ -140,18 +134,18 @@ def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
     return environment.get_template(name)
 
 
-def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
-    """Return the style of the printed page's margins: what it is above, when and by whom it was made and the page's
-    number below.
-    """
+def print_sheet(title: str, visit: Mapping[str, str], created: str) -> "Markup":
+    """Return the style of a printed page's margins: title, visit, when (``created``) and by what made, page number."""
+    from markupsafe import Markup
+
     about = " · ".join(f"{what} {said}" for what, said in visit.items() if said)
     boxes = {
         "top-left": _css_text(title),
         "top-right": _css_text(about),
-        "bottom-left": _css_text(f"{made} · for research use"),
+        "bottom-left": _css_text(f"biodance {__version__}, {moment(created)} · for research use"),
         "bottom-right": '"page " counter(page) " of " counter(pages)',
     }
-    return f"@page {{ {' '.join(f'@{where} {{ content: {text}; }}' for where, text in boxes.items())} }}"
+    return Markup(f"@page {{ {' '.join(f'@{where} {{ content: {text}; }}' for where, text in boxes.items())} }}")
 
 
 def _css_text(text: str) -> str:

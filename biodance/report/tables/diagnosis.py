@@ -12,7 +12,7 @@ from biodance.display import spaced
 from biodance.effects import Cause, DiscreteEffect
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
-from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.results import SessionDiagnosis
 from biodance.report.tables.schema import Row, Schema
 
 if TYPE_CHECKING:
@@ -34,13 +34,7 @@ CAUSE_ROW = Schema(
     },
     "effect: {effect} | parameters: {told} | simulate: {simulated} | what it is: {what}",
 )
-
-
-def causes_document(causes: Iterable[Cause]) -> list[Row]:
-    """Return every cause: its name, parameters with unit and typical size ([] = it is there or not), what it is, and
-    whether ``biodance simulate --effect`` can hide it.
-    """
-    return CAUSE_ROW.rows(causes)
+"""A cause: parameters with unit and typical size ([] = it is there or not), and whether it can be simulated."""
 
 
 def causes_shown(rows: Iterable[Row]) -> list[Row]:
@@ -96,9 +90,7 @@ VISIBILITY_ROW = Schema(
 
 
 def _parameters(found: Sequence[Estimate]) -> Row:
-    """Return every parameter by its name, and what has three axes (``shift_x`` ...) as a vector under the name without
-    axis, too.
-    """
+    """Return every parameter by name, and three axes (``shift_x`` ...) as a vector under the stem, too."""
     estimate = Schema("value sd unit ci95=interval")
     rows = {one.name: estimate.row(one) for one in found}
     for stem in [name.removesuffix("_x") for name in rows if name.endswith("_x")]:
@@ -112,6 +104,7 @@ def _parameters(found: Sequence[Estimate]) -> Row:
 def _masses(found: Identification | None) -> list[Row] | None:
     if found is None or found.status == "failed":
         return None
+    # the mass is the first of the ten parameters of every segment
     sd = np.sqrt(np.diag(found.sip.covariance)[::10])
     columns = zip(found.sip.segments, found.sip.mass, sd, strict=True)
     return [{"name": name, "mass_kg": mass, "mass_sd_kg": s} for name, mass, s in columns]
@@ -176,11 +169,8 @@ CONFUSION_ROW = Schema(
 def foresight_summary(found: Foresight) -> str:
     """Return in two sentences what a movement will see and confuse."""
     mixed = sum(pair.difference < TOLD for pair in found.confusions)
-    mixed_up = (
-        f"{mixed} of them {'looks' if mixed == 1 else 'look'} like another one"
-        if mixed
-        else "all of them are told from each other"
-    )
+    mixed_up = f"{mixed} of them {'looks' if mixed == 1 else 'look'} like another one"
+    mixed_up = mixed_up if mixed else "all of them are told from each other"
     return (
         f"Of {len(found.limits)} causes that a diagnosis looks for, this movement will see {len(found.seen)} at their "
         f"typical size; {mixed_up}."

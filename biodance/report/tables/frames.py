@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
@@ -43,29 +42,24 @@ def _by_trial(schema: Schema, records: Mapping[str, Iterable[Any]]) -> "DataFram
 
 
 def _strides(moved: SessionMovement) -> "DataFrame":
-    columns = {
-        name: f"{name}_{unit.replace('/', '_per_').replace('%', 'percent')}" for name, unit in STRIDE_UNITS.items()
-    }
-    rows = (
-        {
-            "trial": one.trial,
-            "cycle": one.cycles.index(stride.cycle) + 1,
-            "side": stride.cycle.side,
-            **{column: stride.values.get(name) for name, column in columns.items()},
-        }
-        for one in moved
-        for stride in one.strides
-    )
+    plain = {unit: unit.replace("/", "_per_").replace("%", "percent") for unit in STRIDE_UNITS.values()}
+    columns, rows = {name: f"{name}_{plain[unit]}" for name, unit in STRIDE_UNITS.items()}, []
+    for one in moved:
+        for stride in one.strides:
+            about = {"trial": one.trial, "cycle": one.cycles.index(stride.cycle) + 1, "side": stride.cycle.side}
+            rows.append(about | {column: stride.values.get(name) for name, column in columns.items()})
     return table_of(rows, ("trial", "cycle", "side", *columns.values()))
 
 
 def _curves(one: TrialMovement) -> "DataFrame | None":
     if not one.curves:
         return None
+    # a curve holds the very cycle of the list, so that no values need to be compared
     numbers = {id(cycle): k for k, cycle in enumerate(one.cycles, start=1)}
     about = Schema("kind=cycle.kind quantity side unit")
     rows = [{"trial": one.trial, "cycle": numbers[id(curve.cycle)], **about.row(curve)} for curve in one.curves]
     frame = table_of(rows, ("trial", "cycle", *about.places))
+    # one row a curve becomes one row a per cent, its values in the same order
     lasting = frame.loc[frame.index.repeat(len(PERCENT))].reset_index(drop=True)
     lasting["percent"] = np.tile(PERCENT, len(rows))
     lasting["value"] = np.concatenate([curve.value for curve in one.curves])
@@ -186,13 +180,10 @@ def _angles(result: SessionResult, one: TrialResult) -> "DataFrame | None":
     if one.motion is None or result.body is None:
         return None
     names, motion = [joint.name for joint in result.body.joints], one.motion
-    columns: dict[str, Any] = {"determined": motion.determined, "state": _states(motion.frame_state)}
+    state = [AngleState(one).words for one in motion.frame_state]
+    columns: dict[str, Any] = {"determined": motion.determined, "state": state}
     columns |= {f"{name}_deg": motion.known_angles[:, j] for j, name in enumerate(names)}
     return _by_frame(one.name, motion.time, columns)
-
-
-def _states(state: NDArray[np.int8]) -> list[str]:
-    return [AngleState(one).words for one in state]
 
 
 def _wrench(result: SessionResult, one: TrialResult) -> "DataFrame | None":
@@ -224,7 +215,7 @@ def _moments(found: SessionIdentification) -> "DataFrame":
     bands = found.torques
     if bands is None:
         return _joined(())
-    columns: dict[str, Any] = {"used": bands.use, "state": _states(bands.state)}
+    columns: dict[str, Any] = {"used": bands.use, "state": [AngleState(one).words for one in bands.state]}
     for j, name in enumerate(bands.joints):
         told = {"": bands.torque, "_sd": bands.sd, "_table": bands.table}
         columns |= {f"{name}_Nm{kind}": column[:, j] for kind, column in told.items()}

@@ -1,10 +1,7 @@
 """What identification found. Channels in the order Fx Fy Fz Mx My Mz."""
 
-from collections.abc import Callable
-
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Finding
 from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
@@ -29,20 +26,10 @@ VALIDATION_ROW = Schema(
 )
 
 
-def _size(name: str) -> Callable[[Finding], object]:
-    """Return a function that tells value, sd or unit of a finding's first parameter; None without one."""
-    return lambda one: getattr(one.parameters[0], name) if one.parameters else None
-
-
-CORRECTED_ROW = Schema("effect target trials", {name: _size(name) for name in ("value", "sd", "unit")})
+CORRECTED_ROW = Schema("effect target trials value=parameters.0.value sd=parameters.0.sd unit=parameters.0.unit")
 """What was taken off before the fit, in the unit of its cause, null where it has no size; () = all trials. Of a turned
 sign: where in the lab its moments are about, if not about the plate's centre.
 """
-
-
-def corrected_document(found: SessionIdentification | None) -> list[Row]:
-    """Return what was proven to be wrong with the recordings and taken off before the body was fitted."""
-    return CORRECTED_ROW.rows(found.corrected) if found else []
 
 
 def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
@@ -117,14 +104,13 @@ TORQUE_ROW = Schema(
 
 
 def torques_document(bands: TorqueBands | None) -> Row | None:
-    """Return every joint's largest torque with its interval, over the fully measured frames; None where the feet's
-    wrenches are unknown.
-    """
+    """Return every joint's largest torque over measured frames; None where the feet's wrenches are unknown."""
     if bands is None:
         return None
     joints, columns = list[Row](), (bands.torque, bands.half_width, bands.table, bands.sd)
     for j, name in enumerate(bands.joints):
         torque, half, table, sd = (column[bands.use, j] for column in columns)
+        # where the identified torque is largest, either way; the table's is that of the same instant
         peak = int(np.argmax(np.abs(torque)))
         interval = (torque[peak] - half[peak], torque[peak] + half[peak])
         sizes = (np.sqrt(np.mean(sd**2)), np.sqrt(np.mean((torque - table) ** 2)))

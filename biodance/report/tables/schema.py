@@ -93,16 +93,14 @@ class Schema:
 
 
 def value_at(record: Any, place: str) -> Any:
-    """Return what stands at a path of attributes, keys and numbers of items (``#``: how many; several, parted by a
-    comma: as a list); None behind None, and where there is no such key.
-    """
+    """Return what stands at a path of attributes, keys, numbers (``#`` counts; commas: a list); None for none."""
     if "," in place:
         return [value_at(record, one) for one in place.split(",")]
     for name in place.removeprefix("#").split("."):
         if record is None:
             return None
         if name.isdigit():
-            record = record[int(name)]
+            record = record[int(name)] if int(name) < len(record) else None
         else:
             record = record.get(name) if isinstance(record, Mapping) else getattr(record, name)
     return len(record) if place.startswith("#") and record is not None else record
@@ -152,6 +150,7 @@ class RowFormat(Formatter):
         if format_spec == "count":
             return str(len(value))
         if format_spec.startswith("±"):
+            # sd -> half the width of the 95 % interval
             return f"± {self.format_field(value if value is None else SIGMAS * value, format_spec[1:])}"
         if format_spec == "seen":
             return size_seen(value, self.row["typical"], self.row["unit"])
@@ -177,6 +176,7 @@ def shown(said: str, row: Row) -> str:
 
 def plain_values(value: object) -> Any:
     """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite is None."""
+    # the usual types first, and by identity: a document holds hundreds of thousands of numbers
     if type(value) is float:
         return value if math.isfinite(value) else None
     if type(value) is str or type(value) is int or value is None:

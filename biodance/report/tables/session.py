@@ -1,9 +1,4 @@
-"""What was found in a session and in each of its trials, what moved, and the gait: all good cycles of all trials, sides
-beside each other. NaN becomes null.
-"""
-
-from collections.abc import Mapping
-from typing import Any
+"""What was found in a session and its trials, what moved, and the gait of all good cycles. NaN becomes null."""
 
 import numpy as np
 
@@ -12,7 +7,6 @@ from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.scores import GaitScores
 from biodance.cycles.strides import STRIDE_UNITS
-from biodance.cycles.summary import Spread
 from biodance.lab.prepare import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
@@ -21,8 +15,8 @@ from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, SIDES
 from biodance.report.tables.identification import (
     AGREEMENT_ROW,
+    CORRECTED_ROW,
     added_mass_document,
-    corrected_document,
     identification_document,
 )
 from biodance.report.tables.schema import Row, Schema
@@ -82,17 +76,13 @@ def _scores(one: GaitScores | None) -> Row | None:
         return None
     return {
         "people": one.people,
-        "gait_profile_score_deg": {"both": one.overall, **_by_side(one.gps)},
-        "gait_deviation_index": _by_side(one.gdi),
+        "gait_profile_score_deg": {"both": one.overall, **{side: _SPREAD.row(told) for side, told in one.gps.items()}},
+        "gait_deviation_index": {side: _SPREAD.row(told) for side, told in one.gdi.items()},
         "movement_analysis_profile": [
             {"quantity": name, "side": side, "unit": "deg", **_SPREAD.row(told)}
             for (name, side), told in one.variables.items()
         ],
     }
-
-
-def _by_side(found: Mapping[str, Spread]) -> Row:
-    return {side: _SPREAD.row(told) for side, told in found.items()}
 
 
 CHECK_ROW = Schema("what where value limit inside advice")
@@ -112,12 +102,6 @@ _WRENCH = Schema(
 )
 
 
-def _markers(one: TrialResult) -> list[Row]:
-    fit = one.fit
-    seen = zip(fit.names, fit.rms, fit.max, strict=True) if fit else ()
-    return [{"name": name, "rms_m": rms, "max_m": largest} for name, rms, largest in seen]
-
-
 TRIAL_ROW = Schema(
     "name role=trial.role status reason file=trial.source.path.name marker_set=trial.worn "
     "rate_hz=trial.markers.rate gaps_percent marker_rms_m=fit.total_rms marker_rms_by_group_m=fit.by_group "
@@ -125,7 +109,10 @@ TRIAL_ROW = Schema(
     {
         "frames": lambda one: one.trial.markers.time.size if one.trial.markers else 0,
         "gaps": lambda one: GAP_ROW.rows(gap for gap in one.gaps if gap.percent > 0),
-        "markers": _markers,
+        "markers": lambda one: [
+            {"name": name, "rms_m": rms, "max_m": largest}
+            for name, rms, largest in (zip(one.fit.names, one.fit.rms, one.fit.max, strict=True) if one.fit else ())
+        ],
         "wrench": _WRENCH.at("comparison"),
         "standing": Schema(
             "trial start_s=start end_s=end mass_kg=mass mass_sd_kg=mass_sd com_ahead_of_cop_m=com_ahead "
@@ -148,9 +135,7 @@ _JOINT = Schema(
 
 
 def filter_document(result: SessionResult) -> Row:
-    """Return the cut-offs of the low-pass of joint coordinates and forces, the lowest of all moving trials and each:
-    ``chosen_by`` the "settings", the "trial" itself, or "usual" where its markers do not tell.
-    """
+    """Return the low-pass cut-offs, the lowest and each moving trial's, and by whom they were ``chosen_by``."""
     asked = result.settings.filter.cutoff
     rows: list[Row] = []
     for one in (one.trial for one in result.trials if one.trial.role != "static"):
@@ -184,7 +169,7 @@ _SESSION = Schema(
             "difference_percent=mass_difference"
         ).row,
         "identification": lambda one: one.identification and identification_document(one.identification),
-        "corrected": lambda one: corrected_document(one.identification),
+        "corrected": lambda one: CORRECTED_ROW.rows(one.identification.corrected) if one.identification else [],
         "added_mass": lambda one: one.identification and added_mass_document(one.identification.search),
         "diagnosis": lambda _: None,
     },
@@ -219,18 +204,17 @@ def _curve(group: CurveGroup) -> Row:
     if not np.isfinite(group.mean).any():
         return about
     low, high = int(np.nanargmin(group.mean)), int(np.nanargmax(group.mean))
+    spread, told = (
+        float(np.nanmean(values)) if np.isfinite(values).any() else None for values in (group.sd, group.parameters_sd)
+    )
     return about | {
         "min": group.mean[low],
         "min_at_percent": PERCENT[low],
         "max": group.mean[high],
         "max_at_percent": PERCENT[high],
-        "sd_mean": _average(group.sd),
-        "parameters_sd_mean": _average(group.parameters_sd),
+        "sd_mean": spread,
+        "parameters_sd_mean": told,
     }
-
-
-def _average(values: Any) -> float | None:
-    return float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
 EVENT_ROW = Schema("time_s=time side down source")
