@@ -10,7 +10,7 @@ from biodance.diagnosis.candidates import SCALE, Candidate, log_priors
 from biodance.effects import Care, Effect, Parameter
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, Rows
-from biodance.inference.scales import LOUD, Scales, prior_sd
+from biodance.inference.scales import EACH, LOUD, Scales, prior_sd
 from biodance.inference.sets import Search
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
@@ -74,15 +74,20 @@ def rows(
     observations: int = 5,
     width: int = 4,
     blocks: int = 12,
+    each: int = 0,
     causes: dict[str, Array] | None = None,
 ) -> DrawnRows:
-    """Return rows with columns of three groups of ``width`` each and a target of unit noise."""
+    """Return rows with columns of three groups of ``width`` each and a target of unit noise; so many columns of the
+    last group belong to ``each`` of its members.
+    """
     count = plates + markers + observations
     group = np.repeat(np.arange(len(GROUPS)), width)
+    member = np.where(group == len(GROUPS) - 1, np.cumsum(group == len(GROUPS) - 1) - 1, -1)
+    member = member // each if each else np.full(group.size, -1)
     X = rng.normal(size=(count, group.size))
     block = np.concatenate([np.arange(plates) % blocks, np.full(markers, 6 * len(BANDS)), np.full(observations, -1)])
     empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)))
-    return DrawnRows(None, empty, None, X, rng.normal(size=count), group, block, GROUPS, columns=causes or {})
+    return DrawnRows(None, empty, None, X, rng.normal(size=count), group, member, block, GROUPS, columns=causes or {})
 
 
 def search(drawn: DrawnRows) -> Search:
@@ -99,7 +104,7 @@ def covariance(drawn: DrawnRows, scales: Scales, *more: Array) -> Array:
     """Return the covariance (r, r) of the target under given ``scales``, with ``more`` columns of unit coefficients;
     observations as loud as their weights say.
     """
-    X = drawn.X * np.exp(scales.groups)[drawn.group]
+    X = drawn.X * scales.of(drawn.group, drawn.member)
     sd = np.ones(len(drawn.y))
     sd[: drawn.plates] = np.exp(scales.noise)
     sd[drawn.simulated :] = scales.weights**-0.5
@@ -108,7 +113,8 @@ def covariance(drawn: DrawnRows, scales: Scales, *more: Array) -> Array:
 
 def log_prior(drawn: DrawnRows, scales: Scales) -> float:
     """Return the log prior density of scales up to its constant."""
-    return float(-0.5 * np.sum((scales.groups / prior_sd(drawn)) ** 2) - 0.5 * (scales.noise / LOUD) ** 2)
+    columns = np.sum((scales.groups / prior_sd(drawn)) ** 2) + np.sum((scales.members / EACH) ** 2)
+    return float(-0.5 * columns - 0.5 * (scales.noise / LOUD) ** 2)
 
 
 def with_target(drawn: DrawnRows, y: Array) -> DrawnRows:

@@ -82,6 +82,17 @@ def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
     assert np.delete(own, 7).max() == pytest.approx(0.5)  # none is believed to be quieter
 
 
+def test_a_fault_that_only_larger_tolerances_would_excuse_is_loud_in_its_rows() -> None:
+    """Two columns of a tolerance in one band and channel, sixty times as large as anywhere."""
+    found = drawn(np.full(BLOCKS, 0.6), each=40)
+    faulty, own = found.block == 7, found.group == 2
+    X = np.where(own & ~faulty[:, None], 0.0, found.X)
+    y = 0.6 * np.random.default_rng(5).normal(size=len(found.y)) + X[:, own] @ np.array([60.0, -60.0])
+    told = shown(replace(found, X=X, y=y))
+    assert told[7] == pytest.approx(1.0)
+    assert np.delete(told, 7).max() < 0.85
+
+
 @pytest.mark.parametrize("name", ["biomechzoo/HC032A", "opensim_models/raj_walk", "c3d_parser_Sydney"])
 def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
     name: str, recording: Callable[[str], SessionResult]
@@ -94,7 +105,7 @@ def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
     found = own_noise(rows_of(seen.problem, seen.causes, own, None)).noise
     white = np.linalg.inv(np.linalg.cholesky(own.noise))
     share = np.sqrt(np.einsum("bcc->bc", white @ found @ white.swapaxes(1, 2)))
-    assert np.median(share) < 0.9  # the shortest walk has 108 rows, which say little of 30 sizes
+    assert np.median(share) < 0.95  # the shortest walk has 108 rows, which say little of 30 sizes
     assert share.max() > 0.9
 
 

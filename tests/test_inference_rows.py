@@ -20,8 +20,10 @@ from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, rows_of
 from biodance.inference.scales import bare, nominal, posterior, prior_sd
+from biodance.inference.session import see
 from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.observations import ObservableCause, Observation
+from biodance.pipeline.judged_trials import chosen_windows
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import shipped
 
@@ -111,6 +113,21 @@ def test_plates_have_a_scale_beside_other_tolerances() -> None:
     assert {"plate_offset": Care.PLATES, "plate_gain": Care.PLATES, "body_mass": Care.OTHER}.items() <= of.items()
     plates = {name for name in effects() if name.startswith("plate_")}
     assert {name for name, one in effects().items() if one.care is Care.PLATES} == plates
+
+
+def test_each_marker_has_a_scale_of_its_own_and_terms_of_plates_share_theirs(recording) -> None:
+    """A real walk: the virtual session of this file shows no marker's place."""
+    result, marker = recording("c3d_parser_Sydney"), "marker_misplaced"
+    looked, known = chosen_windows(result.trials), shipped()
+    seen = see(result.body, looked, known, effects(), None)
+    found = rows_of(seen.problem, seen.causes, known, None)
+    at = {names: set(found.member[where].tolist()) for names, (where, _) in found.tolerated.items()}
+    own = [one for (name, _), one in at.items() if name == marker]
+    assert len(own) > 15
+    assert all(len(one) == 1 for one in own)
+    assert set().union(*own) == set(range(len(own)))
+    assert {k for (name, _), one in at.items() if name != marker for k in one} == {-1}
+    assert set(found.member[found.group <= 0].tolist()) == {-1}, "what has no scale, and the body"
 
 
 def test_a_spread_between_laboratories_has_no_scale() -> None:

@@ -12,6 +12,7 @@ from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.scales import (
     CONVERGED,
+    EACH,
     FLESH,
     FLOOR,
     SPREAD,
@@ -28,9 +29,9 @@ from biodance.inference.scales import (
 )
 
 SCALES = (
-    Scales(np.zeros(3), 0.0, np.zeros(0)),
-    Scales(np.array([0.4, -0.2, 0.9]), 0.0, np.zeros(0)),
-    Scales(np.array([0.1, 0.7, -0.3]), 0.6, np.zeros(0)),
+    Scales(np.zeros(3), np.zeros(0), 0.0, np.zeros(0)),
+    Scales(np.array([0.4, -0.2, 0.9]), np.zeros(0), 0.0, np.zeros(0)),
+    Scales(np.array([0.1, 0.7, -0.3]), np.zeros(0), 0.6, np.zeros(0)),
 )
 
 
@@ -103,7 +104,7 @@ def test_directions_that_the_rows_do_not_show_are_not_carried_and_miss_nowhere()
 def test_observations_have_student_s_errors_and_their_weights_the_curvature() -> None:
     """Laplace's approximation over all coefficients, at the mean that weighted least squares gives."""
     drawn = rows(np.random.default_rng(4))
-    at = Scales(np.array([0.2, 0.0, -0.1]), 0.3, np.array([1.0, 0.5, 0.2, 0.9, 1.1]))
+    at = Scales(np.array([0.2, 0.0, -0.1]), np.zeros(0), 0.3, np.array([1.0, 0.5, 0.2, 0.9, 1.1]))
     found = posterior(inner(drawn), prior_sd(drawn), at)
     X = (drawn.X @ VisibleColumns.of(drawn).turn) * np.exp(at.groups)[drawn.group]
     C = covariance(drawn, at)
@@ -123,13 +124,13 @@ def test_scales_move_along_the_slope_of_the_evidence_by_fisher_s_information() -
     """A step is slope over information; the slope by finite differences of the dense density."""
     drawn, at = rows(np.random.default_rng(5), observations=0), SCALES[1]
     found, sd, step = posterior(inner(drawn), prior_sd(drawn), at), prior_sd(drawn), 1e-4
-    known = found.curvature(3)
+    known = found.curvature(found.products.group, 3)
     moved = nearer(found, sd)
-    for g in range(3):
-        there = [replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)]
-        slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
-        expected = np.clip(slope / (max(known.known[g], known.observed[g]) + 1 / sd[g] ** 2), -0.7, 0.7)
-        assert moved.groups[g] == pytest.approx(max(at.groups[g] + expected, FLOOR), abs=1e-5)
+    ways = [[replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)] for g in range(3)]
+    slope = np.array([(density(drawn, up) - density(drawn, down)) / (2 * step) for up, down in ways])
+    information = known.known + np.diag(np.maximum(known.observed - np.diag(known.known), 0.0) + 1 / sd**2)
+    expected = np.clip(np.linalg.solve(information, slope), -0.7, 0.7)
+    np.testing.assert_allclose(moved.groups, np.maximum(at.groups + expected, FLOOR), atol=1e-5)
     there = [replace(at, noise=at.noise + way * step) for way in (1, -1)]
     slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
     assert (moved.noise > at.noise) == (slope > 0)
@@ -141,7 +142,7 @@ def test_what_is_observed_of_a_scale_is_the_second_derivative_of_the_evidence() 
     for g in range(3):
         here = [density(drawn, replace(at, groups=at.groups + way * step * np.eye(3)[g])) for way in (-1, 0, 1)]
         bent = -np.diff(here, 2)[0] / step**2
-        assert found.curvature(3).observed[g] + 1 / sd[g] ** 2 == pytest.approx(bent, rel=1e-5)
+        assert found.curvature(found.products.group, 3).observed[g] + 1 / sd[g] ** 2 == pytest.approx(bent, rel=1e-5)
 
 
 @pytest.mark.parametrize("size", [4.0, 8.0, 30.0])
@@ -152,19 +153,53 @@ def test_a_coefficient_larger_than_its_scale_does_not_throw_it_to_and_fro(size: 
     assert nearer(found, prior_sd(drawn)).far(found.scales) < CONVERGED
 
 
-def test_the_information_on_a_scale_is_that_of_many_draws() -> None:
-    """Its inverse is the variance of the most probable logarithm: the variance of the slope, over bodies drawn."""
+@pytest.mark.parametrize(("plates", "markers"), [(60, 12), (12, 3)])
+def test_the_information_on_scales_is_that_of_many_draws(plates: int, markers: int) -> None:
+    """The covariance of the slopes over bodies drawn; where rows are fewer than columns, scales share what is told."""
     rng = np.random.default_rng(6)
-    drawn, at, slopes = rows(rng, observations=0, width=8), SCALES[0], []
-    root, columns, none = np.linalg.cholesky(covariance(drawn, at)), VisibleColumns.of(drawn), np.empty((72, 0))
+    drawn, at, slopes = rows(rng, plates=plates, markers=markers, observations=0, width=8), SCALES[0], []
+    root, columns = np.linalg.cholesky(covariance(drawn, at)), VisibleColumns.of(drawn)
+    group, none = columns.group, np.empty((len(drawn.y), 0))
     for _ in range(1500):
         target = root @ rng.normal(size=len(drawn.y))
         one = posterior(products(columns, none, target, sure(drawn)), prior_sd(drawn), at)
-        own = np.bincount(drawn.group, weights=one.u**2)
-        slopes.append(own + one.curvature(3).shares - np.bincount(drawn.group))
+        slopes.append(np.bincount(group, weights=one.u**2) + one.curvature(group, 3).shares - np.bincount(group))
+    known = posterior(inner(drawn), prior_sd(drawn), at).curvature(group, 3).known
+    own = np.diag(known)
     np.testing.assert_allclose(np.mean(slopes, axis=0), 0.0, atol=0.35)
-    np.testing.assert_allclose(np.var(slopes, axis=0), posterior(inner(drawn), prior_sd(drawn), at).curvature(3).known,
-                               rtol=0.15)  # fmt: skip
+    # Standard deviation of a covariance of 1500 draws: the root of the product of both variances over that of 1500.
+    np.testing.assert_allclose(np.cov(np.transpose(slopes)), known, atol=4 * np.sqrt(own.max() ** 2 / 1500))
+    assert (known[0, 1] > 0.5) == (plates < 20)
+
+
+def test_a_member_s_scale_moves_with_its_group_s_along_both_slopes() -> None:
+    """Two members of two columns each in the last group: a step solves for groups and members at once, and beside a
+    member of eight standard deviations the group and the other member stay near usual.
+    """
+    drawn, step = rows(np.random.default_rng(14), observations=0, each=2), 1e-4
+    at, sd = Scales(np.array([0.1, 0.2, 0.4]), np.array([0.3, -0.2]), 0.0, np.zeros(0)), prior_sd(drawn)
+    found = posterior(inner(drawn), sd, at)
+    constant = -0.5 * len(drawn.y) * np.log(2 * np.pi)
+    assert found.log_evidence == pytest.approx(density(drawn, at) - constant, rel=1e-10)
+    parts = np.array([[1.0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 1, 0], [0, 0, 1, 0, 1]])
+
+    def moved(logs):
+        return density(drawn, replace(at, groups=logs[:3], members=logs[3:]))
+
+    logs = np.concatenate([at.groups, at.members])
+    slope = np.array([moved(logs + step * one) - moved(logs - step * one) for one in np.eye(5)]) / (2 * step)
+    known = found.curvature(np.where(drawn.group < 2, drawn.group, 2 + drawn.member), 4)
+    information = known.known + np.diag(np.maximum(known.observed - np.diag(known.known), 0.0))
+    prior = np.diag(np.concatenate([1 / sd**2, np.full(2, 1 / EACH**2)]))
+    expected = logs + np.clip(np.linalg.solve(parts.T @ information @ parts + prior, slope), -0.7, 0.7)
+    one = nearer(found, sd)
+    np.testing.assert_allclose(one.groups, np.maximum(expected[:3], FLOOR), atol=1e-5)
+    np.testing.assert_allclose(one.members, expected[3:], atol=1e-5)
+    far = with_target(drawn, drawn.X @ np.where(drawn.member == 0, 8.0, 0.0))
+    told, alone = (fit(inner(some), sd, nominal(some)).scales for some in (far, replace(far, member=np.full(12, -1))))
+    assert told.members[0] > 0.6 > told.groups[2] + 0.2
+    assert told.members[1] < 0.1
+    assert alone.groups[2] > told.groups[2] + 0.2, "without a scale of its own it makes all others as large"
 
 
 def test_scales_that_were_drawn_are_found() -> None:
@@ -173,7 +208,7 @@ def test_scales_that_were_drawn_are_found() -> None:
     for seed in range(25):
         rng = np.random.default_rng(100 + seed)
         drawn = rows(rng, plates=600, observations=0, width=40)
-        root = np.linalg.cholesky(covariance(drawn, Scales(truth, noise, np.zeros(0))))
+        root = np.linalg.cholesky(covariance(drawn, Scales(truth, np.zeros(0), noise, np.zeros(0))))
         drawn = with_target(drawn, root @ rng.normal(size=len(drawn.y)))
         one = fit(inner(drawn), prior_sd(drawn), nominal(drawn)).scales
         found.append([*one.groups, one.noise])
@@ -219,7 +254,7 @@ def test_of_columns_that_do_the_same_the_rows_show_the_sum_alone(scale: float) -
     here = np.flatnonzero(drawn.group == 0)[:2]
     alike[:, here[1]] = alike[:, here[0]]
     drawn = replace(drawn, X=alike)
-    scales = Scales(np.array([scale, 0.2, -0.1]), 0.3, np.zeros(0))
+    scales = Scales(np.array([scale, 0.2, -0.1]), np.zeros(0), 0.3, np.zeros(0))
     columns = VisibleColumns.of(drawn)
     found = posterior(bare(columns), prior_sd(drawn), scales)
     one = Hypothesis((), columns, found, 0.0, np.zeros((len(drawn.y), 0)), drawn.y, sure(drawn))

@@ -30,7 +30,9 @@ def drawn(seed: int, sizes: dict[str, float], *, visible: float = 1.0, **kind):
     made = rows(rng, **kind)
     columns = {name: visible / np.sqrt(len(made.y)) * rng.normal(size=(len(made.y), 1)) for name in sizes}
     added = sum(size * columns[name][:, 0] for name, size in sizes.items())
-    root = np.linalg.cholesky(covariance(made, Scales(np.zeros(3), 0.0, np.ones(len(made.y) - made.simulated))))
+    root = np.linalg.cholesky(
+        covariance(made, Scales(np.zeros(3), np.zeros(0), 0.0, np.ones(len(made.y) - made.simulated)))
+    )
     return replace(with_target(made, root @ rng.normal(size=len(made.y)) + added), columns=columns)
 
 
@@ -114,7 +116,7 @@ def most_probable(made, causes) -> float:
     more = [SCALE * made.columns[one.effect.target] for one in causes]
 
     def minus(at):
-        scales = Scales(at[:3], float(at[3]), np.zeros(0))
+        scales = Scales(at[:3], np.zeros(0), float(at[3]), np.zeros(0))
         C = covariance(made, scales, *more)
         C[:n, :n] += np.diag(louder[:n] * np.exp(2 * scales.noise))
         return -multivariate_normal(np.zeros(len(made.y)), C).logpdf(made.y) - log_prior(made, scales)

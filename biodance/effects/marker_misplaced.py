@@ -37,6 +37,7 @@ class MarkerMisplaced(Effect):
         for axis in "xyz"
     )
     taken_up_by_calibration = True
+    each_its_own = True
     separated_by = "A second static trial at the end of the session shows where the marker sits now."
     advice = "Look at the marker on the video; record another static trial and scale the body on it."
     about = About(

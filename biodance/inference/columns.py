@@ -1,7 +1,8 @@
 """The columns that are no fault, turned to what the rows show of them.
 
-Coefficients of one group have one scale, u ~ N(0, lambda^2 1): any rotation of them is as good. In the directions of
-the singular vectors of their columns, most show nothing: they keep what they were before, and need not be carried.
+Coefficients of one group, and of one member where it has any, have one scale, u ~ N(0, lambda^2 1): any rotation of
+them is as good. In the directions of the singular vectors of their columns, most show nothing: they keep what they were
+before, and need not be carried.
 """
 
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ class VisibleColumns:
         Whitened columns per nominal standard deviation, those that observations share last.
     group : (K,) array of int
         Group of each column; -1: its size is known.
+    member : (K,) array of int
+        Which one of its group each column is (`Rows.member`).
     turn : (P, K) array
         Coefficients of `Rows.X` for one unit of each column.
     inner : (Q, K, K) array
@@ -40,15 +43,17 @@ class VisibleColumns:
     rows: Rows
     X: Array
     group: NDArray[np.intp]
+    member: NDArray[np.intp]
     turn: Array
     inner: Array
 
     @classmethod
     def of(cls, rows: Rows) -> "VisibleColumns":
         """Return the columns of ``rows`` in the directions that these show."""
-        parts, turns, group = [], [], []
-        for g in [*range(len(rows.groups)), -1]:
-            here = np.flatnonzero(rows.group == g)
+        parts, turns, group, member = [rows.X[:, :0]], [np.zeros((rows.group.size, 0))], [], []
+        cells = {*zip(rows.group.tolist(), rows.member.tolist(), strict=True)}
+        for g, m in sorted(cells, key=lambda cell: (cell[0] < 0, cell)):
+            here = np.flatnonzero((rows.group == g) & (rows.member == m))
             own, way = rows.X[:, here], np.eye(here.size)
             if g >= 0:
                 # Eigenvectors of X'X are the right singular vectors of X, eigenvalues their squared singular values.
@@ -59,8 +64,10 @@ class VisibleColumns:
             turns.append(whole)
             parts.append(own @ way)
             group += [g] * way.shape[1]
+            member += [m] * way.shape[1]
         X = np.concatenate(parts, axis=1)
-        return cls(rows, X, np.array(group, dtype=int), np.concatenate(turns, axis=1), _within(rows, X))
+        found = np.array(group, dtype=int), np.array(member, dtype=int)
+        return cls(rows, X, *found, np.concatenate(turns, axis=1), _within(rows, X))
 
     def only(self, where: slice) -> NDArray[np.intp]:
         """Return the indices of the columns that hold coefficients ``where`` of `Rows.X` and no others."""

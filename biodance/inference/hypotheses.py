@@ -92,15 +92,15 @@ class Hypothesis:
         return size
 
     def variance(self, where: slice, unit: Array) -> float:
-        """Return the posterior variance of ``unit`` (k,) times the coefficients of `Rows.X` ``where``, all of one
-        group. In directions that the rows do not show they keep the variance of the prior.
+        """Return the posterior variance of ``unit`` (k,) times the coefficients of `Rows.X` ``where``. In directions
+        that the rows do not show they keep the variance of the prior.
         """
         # value = own' u, as coefficients = turn (size * u); what turn leaves out of unit no row shows
-        seen, own = unit @ self.columns.turn[where], np.zeros(self.fit.u.size)
+        turn, own = self.columns.turn[where], np.zeros(self.fit.u.size)
+        seen = unit @ turn
         own[: seen.size] = seen * self.fit.size[: seen.size]
-        (group,) = {*self.rows.group[where]}
-        scale = float(np.exp(2 * self.fit.scales.groups[group])) if group >= 0 else 1.0
-        return self.fit.variance(own) + float(unit @ unit - seen @ seen) * scale
+        scale = self.fit.scales.of(self.rows.group[where], self.rows.member[where])
+        return self.fit.variance(own) + float(np.sum(((unit - turn @ seen) * scale) ** 2))
 
     def whole_covariance(self, one: NamedCause) -> Array:
         """Return the covariance (p, p) of the size of a cause, with what of the first parameter lies in the body: the

@@ -2,8 +2,9 @@
 
 Tolerances say how loud a session of its movement and its markers may be. Most real ones are quieter, each in its own
 bands: beside everything that is no fault, s_q^2 = |e_q|^2 / (n_q - t_q), e what the posterior mean leaves of the rows
-of a band and channel, t the degrees of freedom that the columns take of them. A fault in these rows counts as their
-noise here, so that they are as loud as it is, or as expected.
+of a band and channel, t the degrees of freedom that the columns take of them. Tolerances are as large as anywhere for
+this: larger ones, by which a session without a cause excuses its fault, excuse noise of other channels as well. A fault
+in these rows counts as their noise here, so that they are as loud as it is, or as expected.
 """
 
 from dataclasses import replace
@@ -13,7 +14,7 @@ from scipy.linalg import solve_triangular
 
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import Rows
-from biodance.inference.scales import LOUD, ScaledFit, fit, nominal, prior_sd, products
+from biodance.inference.scales import LOUD, ScaledFit, as_anywhere, fit, nominal, posterior, prior_sd, products
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
@@ -36,7 +37,8 @@ def own_noise(rows: Rows) -> Tolerances:
         # Rows over `quiet` have unit variance where the noise is as this round believes.
         found = fit(products(columns, none, rows.y, 1 / quiet), sd, scales)
         before, scales = quiet, found.scales
-        quiet = _shown(rows, columns, found, before)
+        usual = posterior(found.products, sd, as_anywhere(scales, rows))
+        quiet = _shown(rows, columns, usual, before)
         if np.abs(np.log(quiet / before)).max() < _NEAR:
             break
     share = quiet[: len(BANDS) * len(CHANNELS)].reshape(len(BANDS), 1, len(CHANNELS))

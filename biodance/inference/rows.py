@@ -52,6 +52,9 @@ class Rows:
         Whitened target.
     group : (K,) array of int
         Index in ``groups`` of each column: columns of one group share a scale; -1: of `FIXED` size.
+    member : (K,) array of int
+        Which marker, joint or term of a plate each column is: beside that of its group it has a scale of its own; -1:
+        none.
     block : (r,) array of int
         Noise group of each row: band times 6 + channel for the plates, then markers; -1 for observations.
     groups : tuple of str
@@ -69,6 +72,7 @@ class Rows:
     X: Array
     y: Array
     group: NDArray[np.intp]
+    member: NDArray[np.intp]
     block: NDArray[np.intp]
     groups: tuple[str, ...]
     tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
@@ -224,6 +228,7 @@ def rows_of(
         X,
         y,
         np.array([-1 if name == FIXED else groups.index(name) for name in names], dtype=int),
+        _members(len(names), units),
         _blocks(problem, len(y)),
         groups,
         units,
@@ -278,6 +283,15 @@ def _group(key: str, care: Mapping[str, Care]) -> str:
         return FIXED
     kind = key.removeprefix("habit ").split()[0]
     return kind if kind in SOFT else care.get(kind, Care.OTHER)
+
+
+def _members(count: int, units: _Units) -> NDArray[np.intp]:
+    """Return which target each of ``count`` columns is (`Rows.member`), of effects of which each is as it is."""
+    own = {name for name, one in effects().items() if one.each_its_own}
+    found = np.full(count, -1)
+    for number, at in enumerate(at for (name, _), (at, _) in units.items() if name in own):
+        found[at] = number
+    return found
 
 
 def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:

@@ -2,14 +2,17 @@
 
 With rows y = X u + e, u ~ N(0, diag lambda_g^2), e ~ N(0, s^2) in the plates' rows, unit normal in the markers' and
 Student in the observations, the logarithms a of all scales have normal priors, and their posterior mode is found by
-Fisher scoring. With A = 1 + L X' S^-2 X L (L the scales of the columns), C = A^-1 and e what the posterior mean leaves:
+Fisher scoring. The logarithm of a column's scale is that of its group and, where each target is as it is (a marker),
+the target's own. Columns of one group and target are a cell c. With A = 1 + L X' S^-2 X L (L the scales of the
+columns), C = A^-1 and e what the posterior mean leaves:
 
-    d log p(y) / d log lambda_g = |u_g|^2 + tr C_gg - n_g         information 2 |1 - C_gg|^2, or as observed
+    d log p(y) / d log lambda_c = |u_c|^2 + tr C_cc - n_c         information 2 |1 - C|^2 in cells c, d; or as observed
     d log p(y) / d log s        = |e|^2 / s^2 + t - n             information 2 (n - t)^2 / n,  t = tr X L C L X' / s^2
 
-What is observed of a group, its own second derivative, is 2 (|u_g|^2 - 2 u_g' C_gg u_g + tr C_gg - |C_gg|^2), whose
-expected value stands above. Where it is larger (coefficients larger than their scale, which its prior holds back), a
-step by what is expected goes too far and back again: the larger of both is taken.
+Of a group it is the sum over its cells. What is observed of a cell, its own second derivative, is
+2 (|u_c|^2 - 2 u_c' C_cc u_c + tr C_cc - |C_cc|^2), whose expected value stands above. Where it is larger (coefficients
+larger than their scale, which its prior holds back), a step by what is expected goes too far and back again: the larger
+of both is taken.
 
 Observations have Student's errors with four degrees of freedom (about one step in twenty is an outlier): their weights
 are iterated (iteratively reweighted least squares). The log evidence is Laplace's approximation over all coefficients.
@@ -26,6 +29,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.linalg.lapack import dpotri
 
+from biodance.effects import Care
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.records import Array
@@ -38,6 +42,10 @@ SPREAD, FLESH, TOLERANCE = 0.25, 0.6, 0.35
 """Standard deviation of the logarithm of the size of a group of what is no fault, between persons and laboratories: of
 the body, of soft tissue, and of tolerances.
 """
+EACH = 0.5
+"""The same of one target beside its group (`Effect.each_its_own`): 1.0 is as probable in faultless real sessions, and
+would take a knocked marker for one of them.
+"""
 FLOOR = -0.3
 """Logarithm below which no group is believed to be smaller than where its size was learned."""
 CONVERGED = 0.02
@@ -48,25 +56,32 @@ _NONE = np.empty(0, dtype=np.intp)
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Logarithms of the scales of the ``groups`` (G,) of columns and of the ``noise``; ``weights`` (n,) of the
-    observations.
+    """Logarithms of the scales of the ``groups`` (G,) of columns, of their ``members`` (M,) beside them and of the
+    ``noise``; ``weights`` (n,) of the observations.
     """
 
     groups: Array
+    members: Array
     noise: float
     weights: Array
 
+    def of(self, group: NDArray[np.intp], member: NDArray[np.intp]) -> Array:
+        """Return the scales (k,) of columns of these groups and members, 1 for those of neither (-1)."""
+        # The last entry is that of index -1.
+        both = np.append(self.groups, 0.0)[group] + np.append(self.members, 0.0)[member]
+        return np.asarray(np.exp(both))
+
     def far(self, other: "Scales") -> float:
         """Return how far the logarithms of scales of columns and noise, and the weights, lie from others."""
-        columns = np.abs(self.groups - other.groups).max(initial=0.0)
-        return float(max(columns, abs(self.noise - other.noise), np.abs(self.weights - other.weights).max(initial=0.0)))
+        here, there = (np.concatenate([one.groups, one.members, [one.noise], one.weights]) for one in (self, other))
+        return float(np.abs(here - there).max())
 
 
 @dataclass(frozen=True, eq=False)
 class Products:
     """Inner products of columns and target, all that the posterior needs: ``plates`` and ``markers`` (K + 1, K + 1)
     with the target last, ``observed`` (n, K + 1) the observations' rows, of which only the columns ``used`` are not
-    zero; ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale; ``without`` indices of columns
+    zero; ``count`` plates' rows; ``group`` and ``member`` (K,) of each column, -1: none; ``without`` indices of columns
     that do not count.
     """
 
@@ -76,14 +91,15 @@ class Products:
     used: NDArray[np.intp]
     count: int
     group: NDArray[np.intp]
+    member: NDArray[np.intp]
     without: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """What the data tell of the scales: ``shares`` (G,) trace of the posterior covariance of each group and ``known``
-    (G,) the information on its scale, ``observed`` (G,) that of just these data; ``taken`` how many of the plates' rows
-    the columns take.
+    """What the data tell of the scales of cells: ``shares`` (C,) trace of the posterior covariance of each and
+    ``known`` (C, C) the information on their scales, ``observed`` (C,) that of each in just these data; ``taken`` how
+    many of the plates' rows the columns take.
     """
 
     shares: Array
@@ -124,28 +140,28 @@ class ScaledFit:
         """(K,) posterior mean per unit of the unscaled columns."""
         return np.asarray(self.size * self.u)
 
-    def curvature(self, count: int) -> Curvature:
-        """Return what the data tell of the scales of ``count`` groups."""
-        group = self.products.group
-        half = dpotri(self.lower, lower=True)[0] if group.size else self.lower  # C below its diagonal, zero above
-        own, known, observed = np.diag(half), np.zeros(count), np.zeros(count)
-        for g in range(count):
-            here = np.flatnonzero(group == g)
-            within, u, c = half.T[np.ix_(here, here)], self.u[here], own[here]  # transposed: rows together in memory
-            # What stands beside the diagonal counts twice, from one half: in |C|^2 (Frobenius) and in u'C u.
-            off = 2 * (np.vdot(within, within) - np.sum(c**2))
-            known[g] = 2 * off + 2 * np.sum((1 - c) ** 2)
-            observed[g] = 2 * (u @ u - 4 * u @ within @ u + 2 * c @ u**2 + np.sum(c - c**2) - off)
-        plates = self.products.plates[:-1, :-1]
-        # tr(L C L X'X) as a sum over products of entries; twice one half less the diagonal counted twice.
-        both = 2 * self.size @ (half.T * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
-        shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
-        return Curvature(shares, known, observed, float(both * np.exp(-2 * self.scales.noise)))
+    def curvature(self, cell: NDArray[np.intp], count: int) -> Curvature:
+        """Return what the data tell of the scales of ``count`` cells, of which each column belongs to ``cell`` (K,),
+        -1: to none.
+        """
+        half = dpotri(self.lower, lower=True)[0] if cell.size else self.lower  # C below its diagonal, zero above
+        own = np.diag(half)
+        C = half + np.tril(half, -1).T
+        there = (cell[:, None] == np.arange(count)).astype(float)
+        shares = own @ there
+        # |C_cd|^2 (Frobenius) between all cells; |1 - C|^2 differs on the diagonal alone.
+        square = there.T @ (C**2 @ there)
+        known = 2 * square + np.diag(2 * (there.sum(axis=0) - 2 * shares))
+        within = np.sum(there * (C @ (self.u[:, None] * there)) * self.u[:, None], axis=0)  # u_c' C_cc u_c
+        observed = 2 * (self.u**2 @ there - 2 * within + shares - np.diag(square))
+        taken = self.size @ (C * self.products.plates[:-1, :-1]) @ self.size  # tr(L C L X'X)
+        return Curvature(shares, known, observed, float(taken * np.exp(-2 * self.scales.noise)))
 
 
 def nominal(rows: Rows) -> Scales:
     """Return the scales of a session that is like those that everything was learned on."""
-    return Scales(np.zeros(len(rows.groups)), 0.0, np.ones(len(rows.y) - rows.simulated))
+    members = int(rows.member.max(initial=-1)) + 1
+    return Scales(np.zeros(len(rows.groups)), np.zeros(members), 0.0, np.ones(len(rows.y) - rows.simulated))
 
 
 def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: NDArray[np.intp] = _NONE) -> Products:
@@ -169,8 +185,15 @@ def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: 
     markers = put(columns.inner[-1], slice(n, r))
     observed = np.concatenate([X[r:], tail[r:]], axis=1)
     used = np.flatnonzero(observed.any(axis=0))
-    group = np.append(columns.group, np.full(Z.shape[1], -1))
-    return Products(plates, markers, observed, used, n, group, without)
+    group, member = (np.append(one, np.full(Z.shape[1], -1)) for one in (columns.group, columns.member))
+    return Products(plates, markers, observed, used, n, group, member, without)
+
+
+def as_anywhere(scales: Scales, rows: Rows) -> Scales:
+    """Return the scales with no tolerance larger than where it was learned: no fault hides in what then is left."""
+    tolerated = np.isin(rows.groups, list(Care))
+    groups = np.where(tolerated, np.minimum(scales.groups, 0.0), scales.groups)
+    return replace(scales, groups=groups, members=np.minimum(scales.members, 0.0))
 
 
 def bare(columns: VisibleColumns) -> Products:
@@ -200,8 +223,7 @@ def fit(found: Products, sd: Array, start: Scales, *, least: float = 0.0) -> Sca
 def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     """Return the posterior under given scales, with its evidence."""
     K = found.group.size
-    # group -1 is no index of the last group here: np.where takes 1.0 for it.
-    size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
+    size = at.of(found.group, found.member)
     # A column of size zero leaves A = 1 there: coefficient zero, prior variance, no part in log |A|.
     size[found.without] = 0.0
     loud = np.exp(-2 * at.noise)
@@ -225,7 +247,7 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     # - log|A| / 2 is - sum log L_kk; a noise of s costs log s for each of the plates' rows.
     value = tails - 0.5 * (square * loud + markers + u @ u) - np.log(np.diag(lower)).sum() - found.count * at.noise
     # Normal priors of the logarithms of the scales.
-    value -= 0.5 * (np.sum((at.groups / sd) ** 2) + (at.noise / LOUD) ** 2)
+    value -= 0.5 * (np.sum((at.groups / sd) ** 2) + np.sum((at.members / EACH) ** 2) + (at.noise / LOUD) ** 2)
     return ScaledFit(lower, u, size, at, float(value), square, found)
 
 
@@ -233,17 +255,33 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
     """Return the scales after one step of Fisher scoring; no group is believed to be smaller than `FLOOR`, and no noise
     than ``least``.
     """
-    known = one.curvature(sd.size)
-    at, found, free = one.scales, one.products, one.products.group >= 0
-    own = np.bincount(found.group[free], minlength=sd.size)
-    square = np.bincount(found.group[free], weights=one.u[free] ** 2, minlength=sd.size) + known.shares
-    # Newton step: slope over the larger information, both with the prior's.
-    groups = (square - own - at.groups / sd**2) / (np.maximum(known.known, known.observed) + 1 / sd**2)
+    at, found = one.scales, one.products
+    cell, parts = _cells(found, at)
+    known = one.curvature(cell, len(parts))
+    free = cell >= 0
+    slope = np.bincount(cell[free], one.u[free] ** 2 - 1.0, len(parts)) + known.shares
+    logs, precision = np.append(at.groups, at.members), np.append(1 / sd**2, np.full(at.members.size, 1 / EACH**2))
+    # The larger information, with the prior's: what is expected, raised to what is observed of each cell.
+    information = known.known + np.diag(np.maximum(known.observed - np.diag(known.known), 0.0))
+    step = np.linalg.solve(parts.T @ information @ parts + np.diag(precision), slope @ parts - precision * logs)
+    groups, members = np.split(logs + np.clip(step, -_FAR, _FAR), [sd.size])
     free_rows = max(found.count - known.taken, 0.0)
-    slope = one.square * np.exp(-2 * at.noise) + known.taken - found.count - at.noise / LOUD**2
-    noise = slope / (2 * free_rows**2 / max(found.count, 1) + 1 / LOUD**2)
-    groups, noise = np.clip(groups, -_FAR, _FAR), float(np.clip(noise, -_FAR, _FAR))
+    louder = one.square * np.exp(-2 * at.noise) + known.taken - found.count - at.noise / LOUD**2
+    noise = float(np.clip(louder / (2 * free_rows**2 / max(found.count, 1) + 1 / LOUD**2), -_FAR, _FAR))
     w = np.append(-one.coefficients, 1.0)
     # Weights of Student's errors, (nu + 1) / (nu + r^2): positive also for outliers, as A needs.
     weights = (TAIL + 1) / (TAIL + (found.observed @ w) ** 2)
-    return Scales(np.maximum(at.groups + groups, FLOOR), max(at.noise + noise, least), weights)
+    return Scales(np.maximum(groups, FLOOR), members, max(at.noise + noise, least), weights)
+
+
+def _cells(found: Products, at: Scales) -> tuple[NDArray[np.intp], Array]:
+    """Return the cell (K,) of each column, -1 for one of fixed scale, and (C, G + M) 1 where the logarithm of a cell's
+    scale has that of a group or of a member in it.
+    """
+    free = (found.group >= 0) | (found.member >= 0)
+    pairs, of_free = np.unique([found.group[free], found.member[free]], axis=1, return_inverse=True)
+    cell = np.full(found.group.size, -1)
+    cell[free] = of_free.ravel()
+    # Index -1, of neither, is none of those counted here.
+    parts = [pairs[k][:, None] == np.arange(some.size) for k, some in enumerate((at.groups, at.members))]
+    return cell, np.concatenate(parts, axis=1).astype(float)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, log_priors
-from biodance.effects import Care, Effect, NamedCause
+from biodance.effects import Effect, NamedCause
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
 from biodance.inference.rows import Rows
@@ -25,6 +25,7 @@ from biodance.inference.scales import (
     TAIL,
     ScaledFit,
     Scales,
+    as_anywhere,
     bare,
     fit,
     nearer,
@@ -268,9 +269,9 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
     its tolerances grew, with these as large as anywhere, so that no fault hides in its own tolerance.
     """
     found = {(s.effect.name, s.effect.target): s for s in _scored(search, one)}
-    scales, tolerated = one.fit.scales, np.isin(search.rows.groups, list(Care))
-    if np.any(scales.groups[tolerated] > _GROWN):
-        usual = at_scales(search, one, replace(scales, groups=np.where(tolerated, 0.0, scales.groups)))
+    usual_scales = as_anywhere(one.fit.scales, search.rows)
+    if usual_scales.far(one.fit.scales) > _GROWN:
+        usual = at_scales(search, one, usual_scales)
         # Both gains count from `one`: the loss of evidence by the usual scales is charged.
         lost = usual.fit.log_evidence - one.fit.log_evidence
         for again in _scored(search, usual):

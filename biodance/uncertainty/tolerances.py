@@ -156,7 +156,7 @@ def without_habits(found: Tolerances) -> Tolerances:
 
 
 _BETWEEN = "real_laboratories"
-_LEARNED = ("null_sessions", "family", _BETWEEN)
+_LEARNED = ("null_sessions", "family", "real_sessions", _BETWEEN)
 """Where the sizes were learned by which sessions without fault are judged."""
 
 

@@ -90,6 +90,10 @@ class Effect(Checked):
     laboratories find it."""
     care: ClassVar[Care] = Care.OTHER
     """With what care of a laboratory it is small, as long as it is no fault."""
+    each_its_own: ClassVar[bool] = False
+    """Whether one target may be much farther off than the others without being a fault: its tolerance has a scale of
+    its own beside that of its care.
+    """
     by_load: ClassVar[bool] = False
     """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
     screened_at: ClassVar[tuple[float, ...]] = ()
