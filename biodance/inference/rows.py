@@ -53,8 +53,7 @@ class Rows:
     group : (K,) array of int
         Index in ``groups`` of each column: columns of one group share a scale; -1: of `FIXED` size.
     member : (K,) array of int
-        Which marker, joint or term of a plate each column is: beside that of its group it has a scale of its own; -1:
-        none.
+        Which target (marker) each column is, with a scale of its own beside that of its group; -1: none.
     block : (r,) array of int
         Noise group of each row: band times 6 + channel for the plates, then markers; -1 for observations.
     groups : tuple of str
@@ -286,9 +285,8 @@ def _group(key: str, care: Mapping[str, Care]) -> str:
 
 
 def _members(count: int, units: _Units) -> NDArray[np.intp]:
-    """Return which target each of ``count`` columns is (`Rows.member`), of effects of which each is as it is."""
-    own = {name for name, one in effects().items() if one.each_its_own}
-    found = np.full(count, -1)
+    """Return `Rows.member` of ``count`` columns: targets of effects of which each is as it is."""
+    found, own = np.full(count, -1), {name for name, one in effects().items() if one.each_its_own}
     for number, at in enumerate(at for (name, _), (at, _) in units.items() if name in own):
         found[at] = number
     return found

@@ -36,6 +36,11 @@ _APART = 1.0
 """s: clocks further apart are said first."""
 
 
+def of_file(notes: tuple[str, ...]) -> list[Attention]:
+    """Return what was made of the robot's file."""
+    return [Attention("warn" if note.startswith("Mended") else "note", note, "", "drawing") for note in notes]
+
+
 def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
     """Return what a person should know of the recordings: clocks, plates, encoders, what contradicts the drawing."""
     out = []
@@ -233,9 +238,8 @@ def identify_robot(
     best, named = (plain, ()) if doubtful else (best, causes)
     wrong = misweighed(best[0])
     words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best[0].identification))
-    of_file = [Attention("warn" if n.startswith("Mended") else "note", n, "", "drawing") for n in body.notes]
     lost = [Attention("warn", why, name, "trial") for name, why in refused.items()]
-    said = strongest_first([*of_file, *lost, *attention_of(trials), *words])
+    said = strongest_first([*of_file(body.notes), *lost, *attention_of(trials), *words])
     judged = tuple(Judged(one.recorded.name, float(one.fit.use.sum()) / RATE) for one in trials)
     missed = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     verdict = "named" if named else "unexplained" if doubtful or wrong else "clean"
