@@ -43,8 +43,8 @@ SPREAD, FLESH, TOLERANCE = 0.25, 0.6, 0.35
 the body, of soft tissue, and of tolerances.
 """
 EACH = 0.5
-"""The same of one target beside its group (`Effect.each_its_own`): 1.0 is as probable in faultless real sessions, and
-would take a knocked marker for one of them.
+"""The same of one target beside its group (`Effect.each_its_own`): 0.8 is more probable in faultless real sessions, and
+would take a marker knocked by 20 mm for a usual one.
 """
 FLOOR = -0.3
 """Logarithm below which no group is believed to be smaller than where its size was learned."""
