@@ -57,7 +57,7 @@ def test_a_mass_is_wrong_only_where_one_was_declared(declared, monkeypatch):
     assert any(one.effect == "body_mass" for one in diagnose_session(result, effects=["body_mass"]).findings)
 
 
-@pytest.mark.parametrize("seconds", [0.1, 0.4])
+@pytest.mark.parametrize("seconds", [0.1, 0.2, 0.4])
 def test_a_delay_of_one_trial_is_named_there_with_its_size(seconds, monkeypatch):
     found = diagnosed(monkeypatch, late(seconds), "squat_1")
     assert names(found) == [("time_delay", "", ("squat_1",))]

@@ -105,7 +105,7 @@ def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
     found = own_noise(rows_of(seen.problem, seen.causes, own, None)).noise
     white = np.linalg.inv(np.linalg.cholesky(own.noise))
     share = np.sqrt(np.einsum("bcc->bc", white @ found @ white.swapaxes(1, 2)))
-    assert np.median(share) < 0.95  # the shortest walk has 108 rows, which say little of 30 sizes
+    assert np.median(share) < 0.9  # the shortest walk has 108 rows, which say little of 30 sizes
     assert share.max() > 0.9
 
 

@@ -3,7 +3,6 @@ recordings.
 """
 
 import json
-from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -128,14 +127,9 @@ def test_plates_without_markers(data):
     assert record["plates"][0]["type"] == 3
 
 
-def test_every_kind_of_real_recording_gives_plain_json(data):
-    """Of every folder and ending the first, the middle and the last one: two folders hold half of all, alike."""
-    kinds = defaultdict(list)
-    for path in sorted(data.rglob("*.*")):
-        if path.is_file() and path.suffix not in (".md", ".toml"):
-            kinds[path.parent, path.suffix].append(path)
-    records = inspect_paths([path for kind in kinds.values() for path in {kind[0], kind[len(kind) // 2], kind[-1]}])
-    assert len(records) >= 100
+def test_every_real_recording_gives_plain_json(data):
+    records = inspect_paths([data])
+    assert len(records) >= 16
     for record in records:
         json.dumps(record, allow_nan=False)
         assert record["status"] in ("ok", "warning") or record["reason"]

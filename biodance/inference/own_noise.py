@@ -2,9 +2,10 @@
 
 Tolerances say how loud a session of its movement and its markers may be. Most real ones are quieter, each in its own
 bands: beside everything that is no fault, s_q^2 = |e_q|^2 / (n_q - t_q), e what the posterior mean leaves of the rows
-of a band and channel, t the degrees of freedom that the columns take of them. Tolerances are as large as anywhere for
-this: larger ones, by which a session without a cause excuses its fault, excuse noise of other channels as well. A fault
-in these rows counts as their noise here, so that they are as loud as it is, or as expected.
+of a band and channel, t the degrees of freedom that the columns take of them. Groups of tolerances are as large as
+anywhere for this: what they share, stretched to excuse one fault, excuses noise of other channels as well; the scale
+that a marker has for itself excuses that marker alone. A fault in these rows counts as their noise here, so that they
+are as loud as it is, or as expected.
 """
 
 from dataclasses import replace
@@ -37,7 +38,7 @@ def own_noise(rows: Rows) -> Tolerances:
         # Rows over `quiet` have unit variance where the noise is as this round believes.
         found = fit(products(columns, none, rows.y, 1 / quiet), sd, scales)
         before, scales = quiet, found.scales
-        usual = posterior(found.products, sd, as_anywhere(scales, rows))
+        usual = posterior(found.products, sd, replace(as_anywhere(scales, rows), members=scales.members))
         quiet = _shown(rows, columns, usual, before)
         if np.abs(np.log(quiet / before)).max() < _NEAR:
             break
