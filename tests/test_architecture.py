@@ -36,6 +36,7 @@ ONE_ALGORITHM = {
     "lab/session/entries.py": "the small tables of session.toml, checked, and what they do to trials",
     "lab/session/recordings.py": "which files of a folder are trials, and what lies beside them",
     "motion/ik/functional_joints.py": "what movement tells of joints: where they are, and which are needed",
+    "motion/ik/joint_fit.py": "the fit behind a functional calibration, and what it contradicts",
     "motion/newton.py": "a person as one mass: at rest on the plates, and moving",
     "pipeline/accepted.py": "copies of a session without faults, and what each of them gains",
     "pipeline/attention.py": "what a person must see first: headline, rows, order",

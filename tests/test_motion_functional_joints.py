@@ -211,13 +211,14 @@ def test_what_lies_elsewhere_is_what_makes_the_data_most_probable() -> None:
     for joint in ("trunk", "right_knee"):
         shown[own_unknowns(joint)] = True
     A, B = 40 * rng.normal(size=(60, SIZE)), 40 * rng.normal(size=(60, 2, 3))
-    wide = (FAULTY * error_size("soft_tissue", "marker")) ** 2
+    sits, wide = error_size("marker_misplaced", "other") ** 2, (FAULTY * error_size("soft_tissue", "marker")) ** 2
 
-    def density(y, wrong, free, marker=None):
+    def density(y, wrong, free, places=(0.0, 0.0)):
+        """``places`` variance of where each marker sits."""
         slope = JointUnknowns(replace(usual, contradicted=wrong)).prior(np.zeros(SIZE))[1]
         spread = np.eye(60) + A[:, free] @ np.linalg.inv((slope.T @ slope)[np.ix_(free, free)]) @ A[:, free].T
-        if marker is not None:
-            spread += wide * B[:, marker] @ B[:, marker].T
+        for marker, own in enumerate(places):
+            spread += own * B[:, marker] @ B[:, marker].T
         return multivariate_normal(np.zeros(60), spread).logpdf(y)
 
     def found(y):
@@ -225,9 +226,9 @@ def test_what_lies_elsewhere_is_what_makes_the_data_most_probable() -> None:
         np.testing.assert_allclose(residual, 0.0, atol=1e-9)
         known = MarkerSlopes(
             ("LKNE", "RKNE"),
-            -np.einsum("rki,r->ki", B, y),
-            np.einsum("rki,rkj->kij", B, B),
-            np.einsum("rki,rp->kip", B, A),
+            -B.reshape(60, 6).T @ y,
+            B.reshape(60, 6).T @ B.reshape(60, 6),
+            B.reshape(60, 6).T @ A,
         )
         return elsewhere(scaling(), np.zeros(SIZE), (-A.T @ y, A.T @ A + slope.T @ slope), known, shown)
 
@@ -239,6 +240,16 @@ def test_what_lies_elsewhere_is_what_makes_the_data_most_probable() -> None:
         assert (one.joint, one.log_bayes_factor) == (joint, pytest.approx(more, rel=1e-6))
     y = noise + B[:, 1] @ [0.0, 0.2, 0.1]
     one = found(y)
-    more = density(y, (), free, marker=1) - density(y, (), free)
+    more = density(y, (), free, (sits, wide)) - density(y, (), free, (sits, sits))
     assert (one.marker, one.log_bayes_factor) == ("RKNE", pytest.approx(more, rel=1e-6))
     assert found(noise) is None
+
+
+@pytest.mark.parametrize(("label", "off", "moved"), [("RHEE", 0.006, False), ("RTOE", 0.03, True)])
+def test_a_marker_that_sits_as_all_do_accuses_no_other(label: str, off: float, moved: bool) -> None:
+    """A foot of two markers turns by the one that is 6 mm off: then neither it nor the other has moved."""
+    true = moving(displaced(hidden()))
+    xyz = np.array(true.xyz)
+    xyz[:, true.names.index(label)] += [off, 0.0, 0.0]
+    said = [note for note in functional_joints(scaling(), [replace(true, xyz=xyz)]).notes if "does not count" in note]
+    assert [f"the marker {label} " in note for note in said] == [True] * moved

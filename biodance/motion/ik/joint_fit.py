@@ -38,8 +38,8 @@ probable (34 sessions of an independent laboratory and ten real ones without fau
 @dataclass(frozen=True, eq=False)
 class MarkerSlopes:
     """What the markers of a movement say of their own places: ``names`` (K); per metre along the three axes of its
-    segment each, ``gradient`` (K, 3) and ``information`` (K, 3, 3) of the cost, and ``shared`` (K, 3, p) with the
-    unknowns of the joints.
+    segment each, ``gradient`` (3K,) and ``information`` (3K, 3K) of the cost, and ``shared`` (3K, p) with the unknowns
+    of the joints.
     """
 
     names: tuple[str, ...]
@@ -106,18 +106,40 @@ def _evidence(gradient: Array, information: Array, prior: tuple[Array, Array], f
 
 
 def _markers(cost: tuple[Array, Array], markers: MarkerSlopes, free: Index) -> dict[str, float]:
-    """Return the log Bayes factor of every marker that has moved, the ``free`` unknowns of the joints adapting."""
+    """Return the log Bayes factor of every marker that has moved against one that sits as all do on a moving body, the
+    ``free`` unknowns of the joints and the places of all other markers adapting: a heel marker that is 5 mm off turns
+    the foot, and its toe marker then seems to lie 30 mm off.
+    """
     gradient, information = cost
-    before = (FAULTY * error_size("soft_tissue", "marker")) ** -2
-    inner = np.linalg.inv(information[np.ix_(free, free)])
-    shared = markers.shared[:, :, free]
-    # Schur complement: the joints' unknowns adapt to a moved marker.
-    pull = markers.gradient - shared @ (inner @ gradient[free])
-    left = markers.information - shared @ inner @ np.swapaxes(shared, 1, 2) + before * np.eye(3)
-    gain = np.einsum("ki,kij,kj->k", pull, np.linalg.inv(left), pull)
-    # Laplace with the prior N(0, 1 / before) of three coordinates: 3/2 log(before) - 1/2 log|left|.
-    value = 0.5 * (gain + 3 * np.log(before) - np.linalg.slogdet(left)[1])
-    return dict(zip(markers.names, value.tolist(), strict=True))
+    usual = error_size("marker_misplaced", "other") ** -2
+    moved = (FAULTY * error_size("soft_tissue", "marker")) ** -2
+    inner = np.linalg.solve(
+        information[np.ix_(free, free)], np.column_stack([markers.shared[:, free].T, gradient[free]])
+    )
+    # Schur complement: the joints' unknowns adapt to markers that lie elsewhere.
+    pull = markers.gradient - markers.shared[:, free] @ inner[:, -1]
+    left = markers.information - markers.shared[:, free] @ inner[:, :-1]
+    covariance = np.linalg.inv(left + usual * np.eye(len(left)))
+    place = covariance @ pull
+    return {
+        name: _wider(covariance[own, own], place[own], usual, moved)
+        for name, own in ((name, slice(3 * k, 3 * k + 3)) for k, name in enumerate(markers.names))
+    }
+
+
+def _wider(covariance: Array, place: Array, usual: float, moved: float) -> float:
+    """Return the log Bayes factor of the prior precision ``moved`` of a marker's place against the ``usual`` one, under
+    which it has the posterior mean ``place`` (3,) and ``covariance`` (3, 3).
+    """
+    precision = np.linalg.inv(covariance)
+    # Natural parameter and information of the data alone: the prior's mean is zero.
+    pull, told = precision @ place, precision - usual * np.eye(3)
+
+    def evidence(prior: float) -> float:
+        whole = told + prior * np.eye(3)
+        return 0.5 * float(pull @ np.linalg.solve(whole, pull) + 3 * np.log(prior) - np.linalg.slogdet(whole)[1])
+
+    return evidence(moved) - evidence(usual)
 
 
 _POSTURES = 150  # Postures taken evenly from all moving trials together
@@ -208,13 +230,12 @@ def beside_sliding_skin(
     # Squares left over degrees of freedom: coordinates seen less those of the postures.
     left = without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
     square = without_slides(every, shared, own, float(left) * alike)
-    each, place = 3 * len(kept), np.arange(3 * len(kept)).reshape(-1, 3)
+    each = 3 * len(kept)
     prior, slope = unknowns.prior(found.theta)
     of_joints = slice(each, each + SIZE)
     cost = square[of_joints, -1] + slope.T @ prior, square[of_joints, of_joints] + slope.T @ slope
     names = tuple(body.markers.names[marker] for marker in kept)
-    inside = square[place[:, :, None], place[:, None, :]]
-    return cost, MarkerSlopes(names, square[place, -1], inside, square[:each, of_joints].reshape(-1, 3, SIZE))
+    return cost, MarkerSlopes(names, square[:each, -1], square[:each, :each], square[:each, of_joints])
 
 
 def _places(body: Body, pose: Poses, kept: Index) -> Array:
