@@ -80,11 +80,14 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Inferred:
-    """A diagnosis with the posterior that it was decided from: ``named`` the causes of its findings, in their order."""
+    """A diagnosis with the posterior that it was decided from: ``named`` the causes of its findings, in their order;
+    ``bare`` the diagnosis before any judgement of causes.
+    """
 
     diagnosis: Diagnosis
     search: Search
     posterior: Posterior
+    bare: Diagnosis
     named: tuple[NamedCause, ...] = ()
 
     @property
@@ -108,6 +111,20 @@ class Inferred:
         )
         fitted = hypothesis(self.search, tuple(one for one in rest if not one.course)).causes if rest else ()
         return replace(self, diagnosis=told, named=(*fitted, *(one for one in rest if one.course)))
+
+    def refuted(self, index: int) -> "Inferred":
+        """Return what the session ends with given that the cause of finding ``index`` is not there, because data that
+        were not used contradict it: another cause may stand in its place; where none does, nobody can tell.
+        """
+        gone = self.diagnosis.findings[index]
+        bare = replace(self.bare, resembles=(*self.bare.resembles, gone), notes=self.diagnosis.notes)
+        found = decide(self.search, self.posterior.lacking((gone.effect, gone.target)), bare)
+        told = found.diagnosis
+        if not found.named:
+            told = replace(told, explained=False, why={**self.diagnosis.why, **told.why, Reason.CONTRADICTED: ()})
+        if self.search.rows.problem is None:  # what a body leaves of the forces was not judged with the causes
+            told = replace(told, adequacy=self.diagnosis.adequacy, p_unknown=self.diagnosis.p_unknown)
+        return replace(found, diagnosis=told)
 
     def known_tolerances(self) -> tuple[Finding, ...]:
         """Return what is no fault and yet known and matters: every tolerance of one size that is not named, whose
@@ -215,14 +232,14 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
         explained=not any((*reasons.values(), named and resembled)),
         why={**bare.why, **_why(posterior, rows, reasons, named=bool(named))},
         findings=(*findings, *_habit(best, rows, findings)),
-        resembles=tuple(finding for _, finding in resembled),
+        resembles=(*bare.resembles, *(finding for _, finding in resembled)),
         tolerated=tuple(one[1] for one in likely if one not in large),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
         p_clean=p_clean,
         p_unknown=posterior.unknown,
     )
-    return Inferred(told, search, posterior, tuple(place.cause for place, _ in named))
+    return Inferred(told, search, posterior, bare, tuple(place.cause for place, _ in named))
 
 
 def _ends(

@@ -176,6 +176,14 @@ class Posterior:
         """The most probable hypothesis where noise is as in laboratories: beside it more may be left."""
         return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
 
+    def lacking(self, name: Key) -> "Posterior":
+        """Return the posterior given that one cause is not there."""
+        return Posterior(
+            tuple(one for one in self.hypotheses if name not in one.names),
+            tuple(one for one in self.screened if (one.effect.name, one.effect.target) != name),
+            self.louder.lacking(name) if self.louder else None,
+        )
+
     def share(self, *places: Set[Key]) -> float:
         """Return the probability that every one of some ``places`` holds a cause of its own, any of the names that the
         place may have, whatever the noise.

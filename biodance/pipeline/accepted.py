@@ -310,7 +310,7 @@ def accepted(result: SessionResult, inferred: Inferred, before: Identification |
         gone, (low, high) = found.findings[worst], (-100 * x for x in reversed(gains[worst]))
         said = f"accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
         inferred = noted(
-            found.inferred.without(worst), f"{cause_in_words(gone.effect, gone.target)} was taken back: {said}"
+            found.inferred.refuted(worst), f"{cause_in_words(gone.effect, gone.target)} was taken back: {said}"
         )
     return SessionDiagnosis(inferred.diagnosis, inferred, before)
 
