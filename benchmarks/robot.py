@@ -122,13 +122,6 @@ def simulate(dance: Dance, truth: Body, hold: float, troubles: dict[str, float])
     return time / to.time, q, applied / (to.mass * to.length), wrench / units
 
 
-def encoded(body: Body, troubles: dict[str, float], angle: Array, torque: Array) -> Array:
-    """Return what encoders (T, n) show of true angles and torques."""
-    angle = np.array(angle)
-    angle[:, ankles(body)] += torque[:, ankles(body)] / troubles.get("ankle", np.inf)
-    return angle
-
-
 def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
     """Write the recording of both dances, and the truth beside its folder."""
     folder, drawn = Path(out), read_urdf(urdf, feet=FEET)
@@ -142,7 +135,7 @@ def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
             played = simulate(dance, replace(dance.body, sip=standing_frames(truth).sip), 1.0, troubles)
             np.savez(cache, *played)
         time, angle, torque, wrench = np.load(cache).values()
-        angle = encoded(drawn, troubles, angle, torque)
+        angle[:, ankles(drawn)] += torque[:, ankles(drawn)] / troubles.get("ankle", np.inf)  # as encoders show it
         lab = RobotLab(ahead=0.37 + k, place=(0.03 - 0.05 * k, -0.02), yaw=0.1 - 0.3 * k)
         write_robot_trial(folder / name, tuple(j.name for j in drawn.joints), time, angle, wrench, lab=lab, seed=k)
         print(f"{name}: {time[-1]:.1f} s, stayed up")

@@ -14,6 +14,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,8 @@ class Fault:
 @dataclass(frozen=True)
 class Score:
     """One session with one fault: whether it was named first, named or in a set, covered (None: no interval), all that
-    was named; ``others`` of which the fault is no look-alike; ``verdict`` of the whole diagnosis.
+    was named; ``others`` of which the fault is no look-alike; ``verdict`` of the whole diagnosis; ``claims`` by name
+    how probable each was said to be.
     """
 
     session: str
@@ -62,6 +64,7 @@ class Score:
     told: str
     others: tuple[tuple[str, str], ...] = ()
     verdict: str = ""
+    claims: tuple[tuple[tuple[str, str], float], ...] = ()
 
 
 def faults_for(session: Session) -> Iterator[Fault]:
@@ -182,6 +185,7 @@ def judged(name: str, fault: Fault, found: tuple[Finding, ...]) -> Score:
         None if low_high is None else low_high[0] <= fault.size <= low_high[1],
         "; ".join(f"{one.effect} {one.target} {size}" for one, size in zip(found, sizes, strict=True)),
         tuple((one.effect, one.target) for one, some in zip(found, sets, strict=True) if some.isdisjoint(fault.truths)),
+        claims=tuple(((one.effect, one.target), one.probability) for one in found if one.probability > 0),
     )
 
 
@@ -227,6 +231,10 @@ def table(scores: list[Score]) -> list[str]:
         blamed = sum(any((one.session, name) not in known for name in one.others) for one in some)
         lines.append(f"| {kind} | {len(some)} | {first} | {listed} | {covers} | {blamed} |")
     lines.append(f"| nothing | {len(clean)} | names in {sum(bool(one.told) for one in clean)} | | | |")
+    new = [(p, name not in one.others) for one in every for name, p in one.claims if (one.session, name) not in known]
+    for low, high in pairwise((0.5, 0.85, 0.95, 1.0)):
+        some = [true for p, true in new if low <= p < high + (high == 1)]
+        lines.append(f"| P {low} to {high}: new names, true | {len(some)} | {sum(some)} | | | |")
     return lines
 
 

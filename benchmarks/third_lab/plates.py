@@ -124,7 +124,9 @@ def measure(rng: np.random.Generator, plate: Plate, forces: Array, moments: Arra
         Kistler: middle of the sensors' plane.
     """
     turn = Rotation.from_euler("z", plate.yaw).as_matrix() @ plate.turn
-    origin = plate.centre + plate.shift - turn @ find_lever(plate)
+    # from the origin of the outputs to the middle of the surface, plate axes
+    lever = plate.deep if plate.make == "amti" else np.array([0.0, 0.0, plate.deep[2]])
+    origin = plate.centre + plate.shift - turn @ lever
     wrench = np.hstack([forces @ turn, (moments - np.cross(origin, forces)) @ turn])
     if plate.delay:
         n = np.arange(len(wrench))
@@ -134,11 +136,6 @@ def measure(rng: np.random.Generator, plate: Plate, forces: Array, moments: Arra
     if plate.lowpass:
         wrench = sosfiltfilt(butter(2, plate.lowpass, fs=rate, output="sos"), wrench, axis=0)
     return wrench
-
-
-def find_lever(plate: Plate) -> Array:
-    """From the origin of the outputs to the middle of the surface, plate axes, m."""
-    return plate.deep if plate.make == "amti" else np.array([0.0, 0.0, plate.deep[2]])
 
 
 def split_kistler(plate: Plate, wrench: Array) -> Array:
