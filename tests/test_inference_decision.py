@@ -9,7 +9,7 @@ from inferred_rows import Drawn, rows, search
 from inferred_sessions import heard, inferred
 from walking import MASS, Wrong, session, standing, walk
 
-from biodance.diagnosis.reasons import DiagnosisStatus
+from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, Parameter
 from biodance.effects.body_mass import BodyMass
@@ -266,6 +266,20 @@ def test_without_a_finding_its_size_goes_and_the_others_are_fitted_again() -> No
     assert (kept, gone) == one.diagnosis.findings
     assert len(less.named) == 1
     assert less.named[0].effect == one.named[0].effect
+
+
+def test_what_kept_data_refute_is_not_there_and_what_else_explains_it_stands_in_its_place() -> None:
+    one = inferred(body(), windows(1, trials=2, hidden=offset(12.0)), tolerances=known(), effects=FAST)
+    seen = set()
+    while one.diagnosis.findings:
+        gone = one.diagnosis.findings[0]
+        seen.add((gone.effect, gone.target))
+        one = one.refuted(0)
+        assert seen.isdisjoint((found.effect, found.target) for found in one.diagnosis.findings)
+        assert all(seen.isdisjoint(some.names) for some in one.posterior.hypotheses)
+    assert seen <= {(found.effect, found.target) for found in one.diagnosis.resembles}
+    assert one.diagnosis.status is DiagnosisStatus.CANNOT_TELL
+    assert Reason.CONTRADICTED in one.diagnosis.why
 
 
 def test_one_foot_on_one_plate_cannot_tell_a_moved_plate_from_a_moved_marker() -> None:

@@ -98,6 +98,10 @@ def test_a_leg_that_is_lighter_carries_less_on_its_side():
     np.testing.assert_allclose(lost[:, 3:5], 9.80665 * np.stack([first[:, 1], -first[:, 0]], axis=1), atol=1e-9)
     assert not effect.possible_in(still, np.array([-1.0, 0.0, 0.0]))
     assert not effect.possible_in(still, np.array([6.0, 0.0, 0.0]))
+    knee = poses(still.body, still.motion.q[:1]).position[0, still.body.segment_index("left_shank")]
+    above = float(np.linalg.norm(middle["left"][0] - knee))
+    for place, possible in ((-above - 0.01, False), (-above + 0.01, True), (0.3, True), (0.4, False)):
+        assert effect.possible_in(still, np.array([1.5, 0.2, place])) is possible
 
 
 def test_a_virtual_prosthesis_is_lighter_and_nearer_to_the_knee_and_the_scale_says_the_same():

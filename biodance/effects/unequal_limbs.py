@@ -20,7 +20,7 @@ of segments, 0.14 with a correlation of 0.8), 0.4 kg."""
 _ENDS = ("shank", "foot")
 """Segments where the lighter part of a leg may begin: thighs of intact people differ by more, and so do arms."""
 _FARTHEST = 0.35
-"""m by which the missing matter may lie off the middle of the limb: from there to the toes."""
+"""m by which the missing matter may lie beyond the middle of the limb: from there to the toes."""
 
 
 class UnequalLimbs(Effect):
@@ -107,9 +107,17 @@ class UnequalLimbs(Effect):
         return super().reported(case, theta, sd)[:1]
 
     def possible_in(self, case: Case, theta: Array) -> bool:
-        """Return whether the limb is lighter, weighs something still, and misses what lies in it."""
-        limb = case.phi[::10][list(segments_beyond(case.body, self.target))].sum()
-        return bool(0 < theta[0] < limb and abs(theta[2]) < _FARTHEST)
+        """Return whether the limb is lighter, weighs something still, and misses what lies in it: between its joint and
+        the toes.
+        """
+        limb = list(segments_beyond(case.body, self.target))
+        part = case.phi.reshape(-1, 10)[limb]
+        mass = part[:, 0]
+        # Middle of the limb in the first posture; the frame of its first segment lies in its joint.
+        pose = case.poses.at(slice(0, 1))
+        middle = mass @ pose.points(limb, part[:, 1:4] / mass[:, None])[0] / mass.sum()
+        nearest = -float(np.linalg.norm(middle - pose.position[0, limb[0]]))
+        return bool(0 < theta[0] < mass.sum() and nearest < theta[2] < _FARTHEST)
 
 
 def _both(names: tuple[str, ...], end: str) -> bool:
