@@ -29,7 +29,7 @@ from biodance.app.sessions import Archive, ChangedElsewhereError
 from biodance.app.window import Asked, Window
 from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
-from biodance.report.live import loopback_socket, quiet_server
+from biodance.report.loopback import LOOPBACK, loopback_socket, quiet_server
 from biodance.report.pages.template import three_js
 
 LARGEST_BODY = 2**20
@@ -199,7 +199,7 @@ def serve_window(
     """
     archive, listener = Archive(folder, out), loopback_socket(port, "--port")
     token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
-    address = f"http://127.0.0.1:{port}/?token={token}"
+    address = f"http://{LOOPBACK}:{port}/?token={token}"
     server = quiet_server(window_application(archive, token=token, port=port))
     prepare_workers()
     tell(address)

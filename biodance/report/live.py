@@ -1,11 +1,10 @@
 """A session while it runs: the operator's page, served over the loopback alone, what is printed, the document."""
 
-import socket
 from collections.abc import Mapping
 from html import escape as escape_html
 from threading import Event, Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -19,18 +18,14 @@ from starlette.routing import Route
 from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.display import cause_in_words, spaced
-from biodance.errors import BiodanceError
 from biodance.pipeline.live import LiveResult, LiveState
 from biodance.pipeline.still import asked_posture
 from biodance.report.dance import mannequin_svg
+from biodance.report.loopback import LOOPBACK, loopback_socket, quiet_server
 from biodance.report.pages.template import template_text
 from biodance.report.tables.identification import ASKED
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_table
-
-if TYPE_CHECKING:
-    import uvicorn
-    from starlette.types import ASGIApp
 
 KNOWN_ROW = Schema(
     "segment quantity unit value sd low=interval.0 high=interval.1 verdict",
@@ -87,7 +82,6 @@ def print_live(found: LiveResult, document: Row, console: Console) -> None:
     console.print(f"next: {escape(found.state.advice)}")
 
 
-_LOOPBACK = "127.0.0.1"
 _HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'",
@@ -95,40 +89,6 @@ _HEADERS: Mapping[str, str] = {
     "X-Content-Type-Options": "nosniff",
 }
 _LAST = 2.0  # s that the end waits for the page to fetch it
-
-
-def loopback_socket(port: int, option: str) -> socket.socket:
-    """Return a socket that listens at a ``port`` of 127.0.0.1 (0 = a free one). Raises BiodanceError: another program
-    has it; ``option`` is what asked for it.
-    """
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((_LOOPBACK, port))
-        listener.listen()
-    except (OSError, OverflowError) as error:
-        listener.close()
-        raise BiodanceError(
-            f"{option} {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
-        ) from error
-    return listener
-
-
-def quiet_server(application: "ASGIApp") -> "uvicorn.Server":
-    """Return a server of an ``application`` that says nothing of its own and keeps no connection for long."""
-    import uvicorn
-
-    return uvicorn.Server(
-        uvicorn.Config(
-            application,
-            log_config=None,
-            access_log=False,
-            server_header=False,
-            timeout_keep_alive=30,
-            timeout_graceful_shutdown=5,
-            limit_concurrency=64,
-        )
-    )
 
 
 class LivePage:
@@ -149,7 +109,7 @@ class LivePage:
         self._pictures: dict[str, str] = {}
         self.body: Body | None = None
         listener = loopback_socket(port, "--page")
-        self.address = f"http://{_LOOPBACK}:{listener.getsockname()[1]}/"
+        self.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
         self._server = quiet_server(Starlette(routes=[Route("/{path:path}", self._answer)]))
         self._thread = Thread(target=self._server.run, kwargs={"sockets": [listener]}, daemon=True)
         self._thread.start()
@@ -196,7 +156,7 @@ class LivePage:
 
     def _answer(self, request: Request) -> Response:
         """Answer with the page or the newest state; who calls us by another host is a stranger (DNS rebinding)."""
-        own = request.headers.get("Host", "").rpartition(":")[0] in (_LOOPBACK, "localhost")
+        own = request.headers.get("Host", "").rpartition(":")[0] in (LOOPBACK, "localhost")
         asked = request.url.path if own else ""
         if asked == "/":
             return HTMLResponse(template_text("live.html"), headers=_HEADERS)
