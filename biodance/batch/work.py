@@ -259,6 +259,7 @@ def _examined(
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.session import followed
+    from biodance.report.tables.diagnosis import asks_nobody
     from biodance.report.write import write_session
     from biodance.settings import assignments
 
@@ -267,8 +268,7 @@ def _examined(
     tables = folder / TABLES if task.tables else None
     _, document = write_session(result, found, folder, tables=tables, drawn=task.pages, tell=tell)
     first = document["attention"][0]["text"] if document["attention"] else ""
-    well = all(row["level"] == "note" for row in document["attention"])
-    status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
+    status = SessionStatus.DONE if asks_nobody(document["attention"]) else SessionStatus.NEEDS_A_PERSON
     tell(f"{status}: {first}")
     return status, first, trial_rows(document), session
 

@@ -62,7 +62,9 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
 
 def exit_code(found: "dict[str, Any]") -> int:
     """Return the exit code of a document: whether somebody must act on anything that it says must be seen."""
-    return shared.DONE if all(row["level"] == "note" for row in found["attention"]) else shared.NEEDS_A_PERSON
+    from biodance.report.tables.diagnosis import asks_nobody
+
+    return shared.DONE if asks_nobody(found["attention"]) else shared.NEEDS_A_PERSON
 
 
 def follow_with_reference(

@@ -77,7 +77,7 @@ def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, 
 
 def mass_check(subject: Subject, weighed: Weighing | None, limits: CheckLimits) -> list[Check]:
     """Compare the mass on the plates with the declared mass, where both are known."""
-    if weighed is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
+    if weighed is None or not np.isfinite(subject.declared_mass):
         return []
     difference = abs(100 * (weighed.mass / subject.mass - 1))
     advice = f"{weighed.mass:.1f} ± {weighed.sd:.1f} kg by {weighed.by.value}: weigh again, or check the plates' zero."

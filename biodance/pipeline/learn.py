@@ -225,7 +225,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     put, known = problem(result.body, windows), shipped()
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
-    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+    mass = session.subject.declared_mass
     own = noise_of_instruments(session.trials, soft_tissue(windows), skin_of(result.body, windows))
     seen = [
         SeenValue("camera_noise", name, own.camera, "m"),

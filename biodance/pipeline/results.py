@@ -169,12 +169,7 @@ class SessionResult:
     @property
     def mass_difference(self) -> float:
         """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
-        return 100 * (self.weighed.mass / self.declared_mass - 1) if self.weighed else float("nan")
-
-    @property
-    def declared_mass(self) -> float:
-        """The declared body mass, kg; NaN where nobody declared it."""
-        return float("nan") if "mass" in self.subject.guessed else self.subject.mass
+        return 100 * (self.weighed.mass / self.subject.declared_mass - 1) if self.weighed else float("nan")
 
     @property
     def stopped(self) -> bool:

@@ -60,7 +60,7 @@ def key_figures(result: SessionResult) -> list[Tile]:
     """Return the mass and the key figures of a session: markers, forces, and what the movement told of the body."""
     tiles = []
     if result.weighed:
-        declared = result.declared_mass
+        declared = result.subject.declared_mass
         beside = f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
         beside = beside if np.isfinite(declared) else "none declared"
         outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)

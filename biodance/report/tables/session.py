@@ -160,7 +160,7 @@ _SESSION = Schema(
         "filter": filter_document,
         "mass_check": Schema(
             "trial=weighed.trials.0 mass_on_plates_kg=weighed.mass mass_on_plates_sd_kg=weighed.sd "
-            "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=declared_mass "
+            "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=subject.declared_mass "
             "difference_percent=mass_difference"
         ).row,
         "identification": lambda one: one.identification and identification_document(one.identification),
