@@ -12,7 +12,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.lab.markers.signals import MarkerGaps
 from biodance.motion.newton import QuietStanding
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.saved_results import provenance
 from biodance.pipeline.trial_result import (
     Check,
@@ -136,7 +136,7 @@ def full_session() -> SessionResult:
         Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",)
     )
     return SessionResult(
-        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still(),
+        session, Placed(None, "Scaled on static."), (), (result,), (mass,), result.standing,
         weighed=Weighing(65.2, 0.1, WeighedBy.STANDING, ("walk <1>",)),
     )  # fmt: skip
 
@@ -154,9 +154,7 @@ def refused_session() -> SessionResult:
         Path("/sessions/S02"),
         {"broken.c3d": "broken.c3d: is empty."},
     )
-    return SessionResult(
-        session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None
-    )
+    return SessionResult(session, Placed(None, "No body."), (Step("body", "refused", "No stature."),), (result,))
 
 
 LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
@@ -179,4 +177,5 @@ TIME = "2026-01-01T00:00:00Z"
 
 def html_of(result: SessionResult, created: str = TIME) -> str:
     """Return the session's page, made at a fixed time."""
-    return page(result, provenance(result, created=created))
+    stills = (still(),) if result.standing else ()
+    return page(result, provenance(result, created=created), stills=stills)

@@ -15,7 +15,7 @@ from biodance.identification.loads import compact_load
 from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.motion.dynamics import compare, predict_wrench
 from biodance.pipeline.identification import identify_trials
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.trial_result import TrialResult, WrenchComparison, trial_fit
 from biodance.records import Motion, Session, Source, Subject, Trial, Wrench
 
@@ -76,7 +76,7 @@ def session_result(*, load: float = 0.0, roles: tuple[str, ...] = ("fit", "valid
     """Return a session with one trial per role, identified where one is to be fitted."""
     trials = tuple(trial_result(f"{role}_{i}", role, seed + i, load=load) for i, role in enumerate(roles))
     session = Session(SUBJECT, tuple(t.trial for t in trials), Path("/lab/S01"))
-    result = SessionResult(session, SUBJECT, body(), "From stature alone.", (), trials, (), None, None)
+    result = SessionResult(session, Placed(body(), "From stature alone."), (), trials)
     return replace(result, identification=identify_trials(body(), trials, name="S01")) if "fit" in roles else result
 
 

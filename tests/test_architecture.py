@@ -18,7 +18,6 @@ LINES = 300
 COMPLEXITY = 20  # the end of radon's grade C
 ONE_ALGORITHM = {
     "lab/program_tables.py": "tables of OpenSim and BIDS, and what their tools want beside them",
-    "pipeline/session.py": "a session through all its stages, each of which may fail alone",
     "pipeline/front.py": "what is asked of a visit: register, identify, diagnose, compare",
     "batch/run.py": "an archive: what is to do, by whom, and what is done",
     "batch/work.py": "one session in its own process, and its outcome",
@@ -44,7 +43,6 @@ ONE_ALGORITHM = {
     "pipeline/export.py": "a session, a trial or a body in the formats of others",
     "pipeline/front_dance.py": "what is conducted before a visit: dances, simulated laboratories",
     "pipeline/identification.py": "a session's masses, stage by stage, and the quality of each",
-    "pipeline/results.py": "the records of one examined session",
     "pipeline/robot.py": "a robot from recording to masses, with what is said of it",
     "pipeline/visits.py": "visits beside each other: their quantities, and what changed",
     "records/session.py": "who came, and what was recorded of him, checked at birth",
@@ -59,7 +57,6 @@ ONE_ALGORITHM = {
     "lab/plates/read.py": "all plates of a recording: decoded, without what is no measurement, placed as told",
     "inference/decision.py": "what a session ends with: places, sizes, habits, reasons, from one posterior",
     "pipeline/live.py": "a recording as a stream: every frame tracked, the wrench watched, the body identified",
-    "pipeline/still.py": "what is drawn of a body: outlines, bones, an instant, a session frame by frame",
     "report/laboratory.py": "a laboratory over all its sessions: its plates, and what it learned",
     "app/window.py": "what a window asks, and what a run has left to answer with",
     "app/sessions.py": "the sessions of a window: their session.toml, state by state, and their runs",

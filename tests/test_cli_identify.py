@@ -36,7 +36,7 @@ def lab(monkeypatch, tmp_path):
         )
     for stages in ("session.followed", "front.followed", "export.examine"):
         monkeypatch.setattr(f"biodance.pipeline.{stages}", lambda session, **_: results[session.folder.name])
-    monkeypatch.setattr("biodance.pipeline.judged_trials.failed_checks", lambda _: (SWAPPED,))  # it holds no raw plates
+    monkeypatch.setattr("biodance.report.write.failed_checks", lambda _: (SWAPPED,))  # it holds no raw plates
     return tmp_path
 
 

@@ -32,7 +32,7 @@ from biodance.pipeline.program_folders import write_bids_folder, write_opensim_f
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Motion, Session, Source, Subject, Trial
 from biodance.report.files import tables_folder, write_files, write_tables
-from biodance.report.write import write_report
+from biodance.report.write import write_session
 
 WHO = Subject(62.0, 1.70, "F", name="S 01")
 BODY = human(WHO)
@@ -212,13 +212,13 @@ def test_a_report_and_what_was_accepted_are_of_one_run(tmp_path: Path, monkeypat
 
     def earlier(out: Path) -> None:
         place = results_folder(out, session.folder)
-        write_report(first, place.part)
+        write_session(first, None, place.part)
         write_files(place.part, {"subject.html": "hers", "body.json": "hers"})
         place.finish(session.folder, {})
 
     def work(out: Path) -> None:
         place = results_folder(out, session.folder, force=True)
-        write_report(second, place.part)
+        write_session(second, None, place.part)
         write_corrected(session, (), (), place.part / CORRECTED)
         write_files(place.part, {"lab.toml": "of this run"})
         place.finish(session.folder, {})

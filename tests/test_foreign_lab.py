@@ -56,7 +56,7 @@ def test_a_person_is_identified_and_gains_on_what_was_kept(visits: Path, bare: S
 def test_nobody_without_load_is_accused_and_a_load_is_found_either_way(visits: Path, bare: SessionResult) -> None:
     loaded = examine(read_session(visits / "B"))
     assert bare.identification is not None
-    assert loaded.declared_mass == pytest.approx(WEIGHT + LOAD)
+    assert loaded.subject.declared_mass == pytest.approx(WEIGHT + LOAD)
     assert bare.identification.search.status == "none"
     for mass in (WEIGHT, WEIGHT + LOAD):
         found = added_mass(declared(loaded, mass), reference=bare.identification.identification)

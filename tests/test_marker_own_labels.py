@@ -81,7 +81,7 @@ def test_own_labels_are_followed(folder: Path, way: str) -> None:
     (folder / "session.toml").write_text(SUBJECT_TOML + said)
     result = examine(read_session(folder, markers=mine if way == "option" else None))
     assert result.body is not None
-    assert result.body_source.startswith("Scaled on the static trial")
+    assert result.placed.source.startswith("Scaled on the static trial")
     for trial in result.trials:
         assert trial.fit is not None, trial.reasons
         assert trial.fit.total_rms < (0.002 if way != "map" else 0.004)

@@ -97,7 +97,7 @@ def test_too_few_healthy_legs_give_no_deviation_index() -> None:
 def test_the_scores_stand_on_the_page_beside_their_reference() -> None:
     healthy = [person("a", 1.0), person("b", 2.0), person("c", 6.0)]
     found = healthy_reference(healthy, healthy)
-    text = movement_section(walked(normal=found.normal, deviation=found.deviation))
+    text = movement_section(walked(healthy=found))
     assert "Distance from the healthy mean of 3 people" in text
     assert "gait deviation index (100 = healthy)" in text
     assert "normal, 3 people" in text

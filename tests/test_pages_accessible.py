@@ -31,7 +31,7 @@ from biodance.report.dance import cards_page
 from biodance.report.laboratory import plates_document, plates_page
 from biodance.report.pages.feedback import write_feedback
 from biodance.report.pages.subject import subject_page
-from biodance.report.write import write_diagnosis, write_report
+from biodance.report.write import write_diagnosis, write_session
 
 pytestmark = ASKED
 NAMES = ("report", "diagnose", "refused", "subject", "subject in German", "subject without numbers")
@@ -59,11 +59,11 @@ def _of_a_session(folder: Path) -> dict[str, Path]:
     before = identification_of(earlier)
     now = hidden(folder / "S01", "plate_gain:target=Fz,gain=0.06", trials=("static", "move_1", "squat_1"))
     result = examine(read_session(now), reference=before)
-    found, moved = biodance.diagnose(result, reference=before), biodance.describe_movement(result)
+    found = biodance.diagnose(result, reference=before)
     for name in ("report", "diagnose"):
         (folder / name).mkdir()
-    write_report(result, folder / "report", diagnosis=found, movement=moved)
-    write_diagnosis(result, found, folder / "diagnose", accepted=False, movement=moved)
+    write_session(result, found, folder / "report")
+    write_diagnosis(result, found, folder / "diagnose", accepted=False)
     pages = {name: folder / name / "report.html" for name in ("report", "diagnose")}
     for name, text in (
         ("refused", html_of(refused_session())),

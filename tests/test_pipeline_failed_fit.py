@@ -89,7 +89,6 @@ def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
     assert FORCED.cause in page
     assert "<figure>" not in page
     result = replace(session_result(), identification=found)
-    assert result.needs_a_person
     said = Attention("fail", f"Not solved. {FORCED.cause}", "", "identification, segments")
     assert said in session_attention(result)
 

@@ -17,13 +17,15 @@ from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.pipeline.still import frames_of, load_still, posture_still, worst_still
+from biodance.pipeline.replay import replay_scene
+from biodance.pipeline.results import Placed
+from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.records.motion import BY_FRAME
 from biodance.report.figures import solid
 from biodance.report.figures.session import RESIDUAL_SCALE, VIEWS, still_figure
 from biodance.report.figures.solid import sheet_png
-from biodance.report.pages.session import replay_data
+from biodance.report.pages.template import script_json
 
 
 @pytest.fixture(scope="module")
@@ -144,8 +146,7 @@ def unpacked(text: str, *shape: int) -> np.ndarray:
 
 
 def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
-    replay = frames_of(result)
-    data = json.loads(replay_data(replay))
+    data = json.loads(script_json(replay_scene(result)))
     one, found = data["trials"][0], result.trials[0]
     frames, segments, markers = one["frames"], one["segments"], one["markers"]
     frame = np.argmin(np.abs(found.motion.time - (one["start_s"] + 7 * one["step_s"])))
@@ -170,16 +171,15 @@ def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
 
 
 def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypatch):
-    monkeypatch.setattr("biodance.pipeline.still._FRAMES", 40)
+    monkeypatch.setattr("biodance.pipeline.replay._FRAMES", 40)
     search, place = result.identification.search, np.array([0.0, -0.2, 0.02])
     best = replace(search.best, segment="left_forearm_hand", place=place)
     found = replace(result.identification, search=replace(search, suspects=(best, *search.suspects[1:])))
-    replay = frames_of(replace(result, identification=found))
-    data = json.loads(replay_data(replay))
+    data = json.loads(script_json(replay_scene(replace(result, identification=found))))
     assert data["load"] == {"on": result.body.segment_index("left_forearm_hand"), "place": place.tolist()}
     assert sum(one["frames"] for one in data["trials"]) <= 44
-    assert frames_of(replace(result, body=None)) is None
+    assert replay_scene(replace(result, placed=Placed(None, ""))) is None
     first, *others = result.trials
     motion = first.motion
     still = replace(first, motion=replace(motion, **{name: getattr(motion, name)[:1] for name in BY_FRAME}))
-    assert first.name not in [one.name for one in frames_of(replace(result, trials=(still, *others))).trials]
+    assert first.name not in [one["name"] for one in replay_scene(replace(result, trials=(still, *others)))["trials"]]

@@ -56,7 +56,7 @@ def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> di
     """Return what page, terminal and JSON say, as plain text, of a verdict beside a check of a trial."""
     full = FULL
     trial = replace(full.trials[0], fit=None, comparison=None, standing=None, checks=(check,))
-    result = replace(full, trials=(trial,), checks=(), standing=None, still=None)
+    result = replace(full, trials=(trial,), checks=(), standing=None)
     found = SessionDiagnosis(reconcile_with_checks(verdict, result, judged))
     made, first = MADE, found.diagnosis.attention
     numbers = json.loads(to_text(diagnosis_document(found)))
@@ -155,7 +155,7 @@ def test_another_weight_is_said_once_and_a_slip_in_session_toml_is() -> None:
     weighed = WrongWeight("The plates carry 72.2 kg in quiet standing, 70.2 kg are declared: check the mass.")
     trial = replace(trial, trial=replace(trial.trial, warnings=(weighed,)))
     session = replace(FULL.session, notes=(Doubt("[trials.wlak] fits no recording of the session"),))
-    result = replace(CALM, session=session, trials=(trial,), standing=None, still=None)
+    result = replace(CALM, session=session, trials=(trial,), standing=None)
     said = session_attention(result)
     assert sum("declared" in one.text + one.about for one in said) == 1
     assert any(one.text.startswith("[trials.wlak] fits no recording") for one in said)
@@ -174,10 +174,9 @@ def test_standing_still_has_no_correlation_on_the_terminal() -> None:
 @pytest.mark.parametrize(("verdict", "code"), [(WHOLE, DONE), (VERDICTS[1], NEEDS_A_PERSON), (None, DONE)])
 def test_report_asks_for_a_person_whenever_its_diagnosis_does(verdict: Diagnosis | None, code: int, tmp_path) -> None:
     trial = replace(FULL.trials[0], fit=None, comparison=None, standing=None, checks=())
-    result = replace(FULL, trials=(trial,), checks=(), standing=None, still=None)
+    result = replace(FULL, trials=(trial,), checks=(), standing=None)
     said = reconcile_with_checks(verdict, result, (STATIC,)).attention if verdict else ()
     found = {"attention": ATTENTION_ROW.rows(said), "diagnosis": None}
-    assert not result.needs_a_person
     assert print_reported(result, tmp_path, found, json=True) == code
 
 

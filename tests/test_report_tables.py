@@ -14,7 +14,7 @@ from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.gain import Gain
 from biodance.errors import SessionRefused
-from biodance.pipeline.movement import session_movement
+from biodance.pipeline.movement import describe_movement
 from biodance.report.files import tables_folder, write_tables
 from biodance.report.tables.frames import session_tables
 
@@ -160,7 +160,7 @@ def test_the_lines_of_the_guide_make_xarrays(result, tmp_path, monkeypatch):
     pytest.importorskip("xarray", reason="xarray is not installed")
     (tmp_path / "Session1-tables").mkdir()
     name = result.trials[0].trial.name
-    movement = session_movement(result)
+    movement = describe_movement(result)
     write_tables(session_tables(result, movement=movement), tmp_path / "Session1-tables")
     monkeypatch.chdir(tmp_path)
     guide = (Path(__file__).parents[1] / "docs" / "guide" / "movement.md").read_text()

@@ -7,6 +7,8 @@ import pytest
 from diagnosed_sessions import body
 from example_results import FOUND, VERDICTS, full_session
 
+from biodance.cli.session import exit_code
+from biodance.cli.shared import DONE
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.repairs import with_failed
@@ -14,14 +16,22 @@ from biodance.effects import QualityCheck
 from biodance.pipeline.attention import (
     headline,
     identified_attention,
-    is_well,
+    open_attention,
     reconcile_with_checks,
     session_attention,
 )
 from biodance.pipeline.identification import NOT_WEIGHED
+from biodance.pipeline.results import Placed
 from biodance.pipeline.trial_result import Check, Step
 from biodance.pipeline.words import in_words
 from biodance.records.attention import Attention, Doubt, Judged, strongest_first
+from biodance.report.tables.diagnosis import ATTENTION_ROW
+
+
+def is_well(one: Diagnosis) -> bool:
+    """Return whether nobody has to do anything: the exit code is 0."""
+    return exit_code({"attention": ATTENTION_ROW.rows(one.attention)}) == DONE
+
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
 
@@ -70,13 +80,13 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     fact = "the right thigh is 38 mm shorter than the left thigh"
     doubt = Doubt(fact, "Check the markers.", about=("right_thigh", "left_thigh"))
     odd = replace(body(), notes=(doubt,))
-    doubtful = replace(result, trials=trials, checks=(), body=odd)
+    doubtful = replace(result, trials=trials, checks=(), placed=Placed(odd, ""))
     one = reconcile_with_checks(Diagnosis(True, ()), doubtful, (STATIC,))
     assert one.verdict == "unexplained"
     assert one.status is DiagnosisStatus.CANNOT_TELL
     assert one.attention[0].text == f"Nobody can tell whether anything is wrong: {fact}. Mend it, and run this again."
     assert one.attention[1].text == f"{fact}. Check the markers."
-    mended = replace(doubtful, body=replace(odd, notes=(Doubt(fact, mended=True),)))
+    mended = replace(doubtful, placed=Placed(replace(odd, notes=(Doubt(fact, mended=True),)), ""))
     assert reconcile_with_checks(Diagnosis(True, ()), mended, (STATIC,)).status is DiagnosisStatus.CLEAN
     assert reconcile_with_checks(Diagnosis(True, (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
     thigh = replace(FOUND, effect="segment_length", target="right_thigh")
@@ -118,7 +128,7 @@ def test_beside_a_refused_step_nothing_is_well() -> None:
 def test_a_check_points_to_the_cause_that_was_found() -> None:
     result = replace(full_session(), checks=(HEAVY,))
     plain = next(one for one in session_attention(result) if one.about == HEAVY.what)
-    named = next(one for one in session_attention(result, [FOUND]) if one.about == HEAVY.what)
+    named = next(one for one in open_attention(result, [FOUND]) if one.about == HEAVY.what)
     assert plain.level == "warn"
     assert "Weigh again." in plain.text
     assert named.level == "note"

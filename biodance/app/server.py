@@ -7,7 +7,6 @@ SameSite=Strict, and whatever changes something must come from our own Origin).
 
 import hmac
 import secrets
-import socket
 import webbrowser
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import anyio
-import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import MutableHeaders
@@ -31,6 +29,7 @@ from biodance.app.sessions import Archive, ChangedElsewhereError
 from biodance.app.window import Asked, Window
 from biodance.batch.run import prepare_workers
 from biodance.errors import BiodanceError, UnknownName
+from biodance.report.loopback import LOOPBACK, loopback_socket, quiet_server
 from biodance.report.pages.template import three_js
 
 LARGEST_BODY = 2**20
@@ -198,32 +197,10 @@ def serve_window(
     BiodanceError
         There is no session, the results' folder is taken, or the port.
     """
-    archive = Archive(folder, out)
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", port))
-    except (OSError, OverflowError) as error:
-        listener.close()
-        raise BiodanceError(
-            f"--port {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
-        ) from error
+    archive, listener = Archive(folder, out), loopback_socket(port, "--port")
     token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
-    application = window_application(archive, token=token, port=port)
-    address = f"http://127.0.0.1:{port}/?token={token}"
-    server = uvicorn.Server(
-        uvicorn.Config(
-            application,
-            log_config=None,
-            access_log=False,
-            server_header=False,
-            timeout_keep_alive=30,
-            timeout_graceful_shutdown=5,
-            limit_concurrency=64,
-            lifespan="on",
-        )
-    )
-    listener.listen()
+    address = f"http://{LOOPBACK}:{port}/?token={token}"
+    server = quiet_server(window_application(archive, token=token, port=port))
     prepare_workers()
     tell(address)
     if opened:

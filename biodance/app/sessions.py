@@ -115,6 +115,7 @@ class SessionText:
         check_session_text(self.path, text)
         if text == self.text:
             return
+        # a change after undo: the state gone back to is added again, so that no later one is lost
         self._keep()
         if self._position() < len(self._states()) - 1:
             self._add(self.text)

@@ -131,12 +131,6 @@ def workbook(place: SessionPlace) -> bytes:
     return buffer.getvalue()
 
 
-def csv_archive(place: SessionPlace) -> bytes:
-    """Return all tables of the results as CSV in a .zip."""
-    paths = [path.with_suffix(".csv") for path in _tables(place)]
-    return _zipped({path.name: path for path in paths})
-
-
 def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
     """Return name and content of the results in the format of another program; of one ``trial`` where it holds one.
     Raises BiodanceError: it cannot be written; the sentence is that of ``biodance export``.
@@ -343,7 +337,8 @@ class Window:
             if kind == "xlsx":
                 return _attached(f"{stem}.xlsx", workbook(place))
             if kind == "csv":
-                return _attached(f"{stem}_tables.zip", csv_archive(place))
+                tables = {f"{path.stem}.csv": path.with_suffix(".csv") for path in _tables(place)}
+                return _attached(f"{stem}_tables.zip", _zipped(tables))
             return _attached(*exported(place, kind, asked.text("trial")))
 
     def correction(self, asked: Asked) -> dict[str, Any]:

@@ -391,6 +391,7 @@ def _work_off(
     tell: Callable[[str, int, int], None],
 ) -> int:
     """Go through tasks that are not final in their folders, write each down, and return how many were open."""
+    # the folders tell what is done: the book does not know what was finished when a run was killed
     known = {task.name: found for task in tasks if (found := outcome_of(task))}
     open_tasks = [task for task in tasks if not (task.name in known and known[task.name].is_final(task))]
     ledger.note(known.values())  # finished when a run was killed

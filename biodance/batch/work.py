@@ -24,6 +24,7 @@ from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.session.file import FILES
 from biodance.lab.session.results_folder import inputs_of, put_in_place, read_manifest, refuse_mixture, write_manifest
 from biodance.library import parse_json
+from biodance.report.tables.schema import Schema
 from biodance.settings import Value
 from biodance.version import __version__
 
@@ -258,6 +259,7 @@ def _examined(
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.session import followed
+    from biodance.report.tables.diagnosis import asks_nobody
     from biodance.report.write import write_session
     from biodance.settings import assignments
 
@@ -266,8 +268,7 @@ def _examined(
     tables = folder / TABLES if task.tables else None
     _, document = write_session(result, found, folder, tables=tables, drawn=task.pages, tell=tell)
     first = document["attention"][0]["text"] if document["attention"] else ""
-    well = all(row["level"] == "note" for row in document["attention"])
-    status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
+    status = SessionStatus.DONE if asks_nobody(document["attention"]) else SessionStatus.NEEDS_A_PERSON
     tell(f"{status}: {first}")
     return status, first, trial_rows(document), session
 
@@ -329,13 +330,20 @@ ROW_TYPES: dict[str, str] = {
 }
 """Every column of summary.parquet and summary.csv, and its type."""
 _KINDS = {"gait": "gait_cycles", "squat": "squats", "sit_to_stand": "rises", "jump": "jumps"}
-_OF_TRIAL = ("role", "status", "reason", "frames", "rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m")
+_TRIAL = Schema(
+    "trial=name role status reason frames rate_hz gaps_percent marker_rms_m marker_max_m "
+    "fz_rms_table_n=wrench.table.rms.2 fz_rms_identified_n=wrench.identified.rms.2"
+)
+_MASS = Schema(
+    "declared_mass_kg=subject.mass_kg mass_on_plates_kg=mass_check.mass_on_plates_kg "
+    "mass_difference_percent=mass_check.difference_percent"
+)
 
 
 def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
     """Return one row for each trial of a session's results.json, those that were refused included."""
     moved = {one["trial"]: one for one in (document["movement"] or {"trials": ()})["trials"]}
-    mass, diagnosis = document["mass_check"] or {}, document["diagnosis"] or {}
+    diagnosis = document["diagnosis"] or {}
     verdict = "not judged"  # nothing was named and no second could be compared, as with plates alone
     if diagnosis and (diagnosis["findings"] or any(row["seconds"] > 0 for row in diagnosis["judged"])):
         verdict = "cannot tell" if diagnosis["status"] == "cannot tell" else str(diagnosis["verdict"])
@@ -343,18 +351,11 @@ def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         "verdict": verdict,
         "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
         "first": document["attention"][0]["text"] if document["attention"] else "",
-        "declared_mass_kg": document["subject"]["mass_kg"],
-        "mass_on_plates_kg": mass.get("mass_on_plates_kg"),
-        "mass_difference_percent": mass.get("difference_percent"),
+        **_MASS.row(document),
     }
     rows = [
         {
-            "trial": trial["name"],
-            **{name: trial[name] for name in _OF_TRIAL},
-            **{
-                f"fz_rms_{body}_n": found["rms"][2] if (found := (trial["wrench"] or {}).get(body)) else None
-                for body in ("table", "identified")
-            },
+            **_TRIAL.row(trial),
             **(_moved(moved[trial["name"]]) if trial["name"] in moved else {}),
             "warnings": len(trial["warnings"]),
             **shared,

@@ -78,7 +78,7 @@ def plates_command(
         found = judge_plates(archive, tell=tell)
         tell("writing the page")
         document = write_plates(found, place.part)
-        folder = put_results(place, archive_folder(archive), {})
+        folder = put_results(place, archive_folder(archive))
     shared.show(document, print_plates, json=json, path=folder / "report.html")
     return shared.NEEDS_A_PERSON if found.judgement.findings or found.refused else shared.DONE
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from biodance.cli import shared
-from biodance.cli.session import print_reported, put_session_results, report_session
+from biodance.cli.session import print_reported, put_session, report_session
 from biodance.errors import BiodanceError, refuse_unknown
 
 if TYPE_CHECKING:
@@ -357,7 +357,7 @@ def demo_command(*, out: shared.OutOption = Path("demo"), force: shared.ForceOpt
             write_session(Subject(62.0, 1.70, "F", 31.0), "short", fresh, seed=1)
         place = results_folder(out / "report", session, force=force)
         result, found = report_session(followed(read_session(session, tell=tell), tell=tell), place.part, tell)
-        folder = put_session_results(place, result.session)
+        folder = put_session(place, result.session)
     return print_reported(result, folder, found, False)
 
 

@@ -1,7 +1,5 @@
 """Commands on a session: report, compare, foresee, diagnose, identify; of a person, or a robot."""
 
-from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,15 +9,15 @@ from cyclopts import Parameter
 from biodance.cli import shared
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from biodance.dance.dance import Dance
     from biodance.lab.session.results_folder import ResultsFolder
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.pipeline.robot import RobotResult
-    from biodance.records import Session
-    from biodance.settings import Value
+    from biodance.records import Session, Trial
+    from biodance.settings import Settings
 
 
 def report_session(
@@ -42,6 +40,7 @@ def report_session(
     try:
         known = read_lab(lab).tolerances
         if result.stopped:
+            # by Ctrl-C, while trials were followed: what is there is weighed, and nothing more is looked for
             result = identified(result, reference=reference, tell=tell)
         else:
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
@@ -63,7 +62,9 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
 
 def exit_code(found: "dict[str, Any]") -> int:
     """Return the exit code of a document: whether somebody must act on anything that it says must be seen."""
-    return shared.DONE if all(row["level"] == "note" for row in found["attention"]) else shared.NEEDS_A_PERSON
+    from biodance.report.tables.diagnosis import asks_nobody
+
+    return shared.DONE if asks_nobody(found["attention"]) else shared.NEEDS_A_PERSON
 
 
 def follow_with_reference(
@@ -138,7 +139,7 @@ def report_command(
         result, found = report_session(
             result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken
         )
-        folder = put_session_results(place, result.session)
+        folder = put_session(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)
 
@@ -168,28 +169,30 @@ def compare_command(
         found = compare_visits(sessions, tell=tell)
         tell("writing the page")
         document = write_visits(found, place.part)
-        inputs = {trial.source.path: trial.source.sha256 for one in sessions for trial in one.trials}
-        folder = put_results(place, sessions[0].folder, inputs)
+        trials = [trial for one in sessions for trial in one.trials]
+        folder = put_results(place, sessions[0].folder, trials)
     shared.show(document, partial(print_compared, found), json=json, path=folder / COMPARE_PAGE)
     return exit_code(document)
 
 
-def put_session_results(place: "ResultsFolder", session: "Session") -> Path:
-    """Put the results of a session in place and return the folder."""
-    inputs = {trial.source.path: trial.source.sha256 for trial in session.trials}
-    return put_results(place, session.folder, inputs, session.settings.as_dict())
-
-
 def put_results(
-    place: "ResultsFolder", source: Path, inputs: Mapping[Path, str], settings: "Mapping[str, Value] | None" = None
+    place: "ResultsFolder", source: Path, trials: "Iterable[Trial]" = (), settings: "Settings | None" = None
 ) -> Path:
-    """Put results in place, bound to recordings and settings; say where files went that are not biodance's."""
+    """Put results in place, bound to the recordings of their trials and to settings, and return the folder; say where
+    files went that are not biodance's.
+    """
     from biodance.lab.session.results_folder import inputs_of
 
-    kept = place.finish(source, inputs_of(inputs, source), settings or {})
+    inputs = {trial.source.path: trial.source.sha256 for trial in trials}
+    kept = place.finish(source, inputs_of(inputs, source), settings.as_dict() if settings else {})
     if kept is not None:
         shared.say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
     return place.place
+
+
+def put_session(place: "ResultsFolder", session: "Session") -> Path:
+    """Put the results of a session in place and return the folder."""
+    return put_results(place, session.folder, session.trials, session.settings)
 
 
 @shared.app.command(name="foresee")
@@ -259,24 +262,19 @@ def diagnose_command(
         shared.show(document, print_robot_diagnosis, json=results.json, path=folder / "report.html")
         return shared.NEEDS_A_PERSON if told.needs_a_person else shared.DONE
     from biodance.pipeline import front
-    from biodance.pipeline.diagnosis import as_diagnosed
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.movement import describe_movement
-    from biodance.report.tables.frames import write_session_tables
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with shared.progress() as tell:
         tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
         result, before, place = follow_with_reference(session, reading, results, tell)
-        recorded, folder = result.session, place.part
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
-        result = as_diagnosed(found.judged or result, found.diagnosis)
-        tell("writing the page")
-        moved = describe_movement(result, lab=reading.lab, tell=tell)
-        write_session_tables(tables, result, found.diagnosis, movement=moved)
-        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
-        folder = put_session_results(place, recorded)
+        document = write_diagnosis(
+            result, found, place.part, accepted=accept, earlier=carried.corrections, tables=tables, lab=reading.lab,
+            tell=tell,
+        )  # fmt: skip
+        folder = put_session(place, result.session)
     results.show_page(folder)
     shared.show(document, print_diagnosis, json=results.json, path=folder / "report.html")
     return shared.NEEDS_A_PERSON if document["failures"] else exit_code(document)
@@ -301,7 +299,7 @@ def examine_robot(
         result = identify_robot(recording, urdf=urdf, feet=both, mend=robot.mend, tell=tell)
         tell("writing the page")
         found = write_robot(result, place.part)
-        folder = put_results(place, recording, {})
+        folder = put_results(place, recording)
     results.show_page(folder)
     return result, folder, found
 
@@ -335,13 +333,8 @@ def identify_command(
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
-    from biodance.pipeline.diagnosis import diagnosed_and_corrected
-    from biodance.pipeline.front_dance import performance_of
-    from biodance.pipeline.judged_trials import failed_checks
+    from biodance.pipeline.front import identified_visit
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.movement import describe_movement
-    from biodance.pipeline.session import by_paper, identification_of
-    from biodance.report.tables.frames import write_session_tables
     from biodance.report.write import write_identification
 
     with shared.progress() as tell:
@@ -349,19 +342,9 @@ def identify_command(
         shown = None if dance is None else Dance.load(dance)
         result, before, place = follow_with_reference(session, reading, results, tell, dance=shown)
         known = read_lab(reading.lab).tolerances
-        result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
-        result = by_paper(result) if method == "paper" else result
-        found = identification_of(result)
-        if shown is not None:
-            found = replace(found, performance=performance_of(result, shown))
-            result = replace(result, identification=found)
-        tell("checking units, signs, labels and clocks")
-        checks = failed_checks(result)
-        moved = describe_movement(result, lab=reading.lab, tell=tell)
-        tell("writing the page")
-        write_session_tables(tables, result, movement=moved)
-        document = write_identification(result, found, place.part, checks=checks, movement=moved)
-        folder = put_session_results(place, result.session)
+        result = identified_visit(result, reference=before, tolerances=known, dance=shown, method=method, tell=tell)
+        document = write_identification(result, place.part, tables=tables, lab=reading.lab, tell=tell)
+        folder = put_session(place, result.session)
     results.show_page(folder)
     return _told_identified(result, folder, document, results.json)
 

@@ -26,7 +26,7 @@ from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.repairs import failed_check
 from biodance.display import cause_in_words, spaced
 from biodance.effects import Case, Cause, NamedCause, QualityCheck, Recorded
-from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
+from biodance.effects.labels_swapped import WORSE, LabelsSwapped, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
@@ -124,9 +124,9 @@ def with_right_labels(
     *,
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None],
-) -> MendedCopy | None:
+) -> tuple[SessionResult, MendedCopy] | None:
     """Return the session, ``recorded`` as checks see it, examined again with those labels exchanged that carry each
-    other's names; None where none do.
+    other's names, and which; None where none do.
 
     Proven before it is kept: a trial that the body follows clearly worse with other names (`WORSE`) keeps its own.
     """
@@ -134,14 +134,15 @@ def with_right_labels(
     while found:
         tell("examining a copy with the labels exchanged")
         trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
-        mended = followed(replace(result.session, trials=trials), reference=reference, known=result.known)
+        mended = followed(replace(result.session, trials=trials), reference=reference, known=result.placed.known)
         worse = {
             after.name
             for before, after in zip(result.trials, mended.trials, strict=True)
             if before.fit and after.fit and after.fit.total_rms > WORSE * before.fit.total_rms
         } & found.keys()
+        # a trial that the body follows worse was no exchange; without it all others are judged anew
         if not worse:
-            return MendedCopy(mended, found, named_exchanges(result.session, found))
+            return mended, MendedCopy(found, named_exchanges(result.session, found))
         found = {name: pairs for name, pairs in found.items() if name not in worse}
     return None
 
@@ -174,17 +175,20 @@ _ROUNDS = 3
 
 def with_faults_undone(
     result: SessionResult,
-    recorded: Recorded,
-    mended: MendedCopy | None,
     chosen: Mapping[str, Cause],
     *,
     reference: SessionIdentification | None,
     tell: Callable[[str], None],
-) -> tuple[MendedCopy | None, Recorded]:
-    """Return a copy of the session, as checks see it ``recorded``, examined again without what the checks of the
-    ``chosen`` causes find and can undo (`Checked.undone`), beside what was ``mended`` already; that, if there is none;
-    and what the checks see of it.
+) -> tuple[SessionResult, Recorded, MendedCopy | None]:
+    """Return a copy of the session, examined again with its labels put right (`with_right_labels`) and without what the
+    checks of the ``chosen`` causes find and can undo (`Checked.undone`); what checks see of it; and what was undone,
+    None where the session is as it was.
     """
+    recorded, mended = recorded_of(result), MendedCopy({}, ())
+    # labels first: under wrong names the body moves as nobody does, and forces seem wrong beside it
+    if LabelsSwapped.name in chosen and (right := with_right_labels(result, recorded, reference=reference, tell=tell)):
+        result, mended = right
+        recorded = recorded_of(result)
     undoing = [kind for kind in chosen.values() if kind.undoes()]
     found: list[QualityCheck] = []
     for _ in range(_ROUNDS):
@@ -197,14 +201,11 @@ def with_faults_undone(
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        result = followed(
-            replace(result.session, trials=trials), reference=reference, known=result.known, earlier=result
-        )
+        again = replace(result.session, trials=trials)
+        result = followed(again, reference=reference, known=result.placed.known, earlier=result)
         recorded = recorded_of(result)
-    if not found:
-        return mended, recorded
-    exchanged, checks = (mended.exchanged, mended.checks) if mended else ({}, ())
-    return MendedCopy(result, exchanged, (*checks, *found)), recorded
+    checks = (*mended.checks, *found)
+    return result, recorded, replace(mended, checks=checks) if checks else None
 
 
 _Mend = Callable[[Case], Case]
@@ -239,19 +240,18 @@ _INSIDE = (OFFSET.name, DELAY.name, GAIN.name)
 
 def with_proven_corrections(
     result: SessionResult,
-    inferred: Inferred | None,
-    mended: MendedCopy | None,
+    diagnosed: SessionDiagnosis,
     *,
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Return the session examined again without what is proven: what checks undid in the copy ``mended``, and the
-    zeros, delays and gains that are `proven` in ``inferred`` or known there as tolerances
+    """Return the session examined again without what is proven: what checks undid in the copy that was judged, and the
+    zeros, delays and gains that are `proven` in its posterior or known there as tolerances
     (`Inferred.known_tolerances`), each as unsure in the fit as there; a proven limb that is lighter than the other is
     fitted as a declared one. The identification names them all (``corrected``). The same session where there are none;
     what is only suspected stays.
     """
-    checks = mended.checks if mended else ()
+    checks, inferred = diagnosed.mended.checks if diagnosed.mended else (), diagnosed.inferred
     if any(one.alike for one in checks):
         return result
     undone = tuple(failed_check(one) for one in checks)
@@ -260,13 +260,14 @@ def with_proven_corrections(
         named = (f for f in inferred.diagnosis.findings if proven(f, inferred.search.prior))
         own = (*named, *(f for f in inferred.known_tolerances() if f.effect in _INSIDE))
     own = tuple(one for one in own if (one.effect, one.target) not in {(c.effect, c.target) for c in checks})
-    base = mended.result if mended else result
+    base = diagnosed.judged or result
     if own:
         tell("identifying without what is proven to be wrong")
         corrections = accepted_corrections(own, f"session {result.session.folder.name}")
         subject = reduce(lambda who, one: one.cause.declared(who, one.target), own, base.session.subject)
         session = replace(base.session, subject=subject)
-        base = examine(session, reference=reference, known=result.known, corrections=corrections, earlier=base)
+        base = examine(session, reference=reference, known=result.placed.known, corrections=corrections, earlier=base)
+    # where the copy tells no body there is nothing that its corrections could have made better
     if not (undone or own) or base.identification is None:
         return result
     return replace(base, identification=replace(base.identification, corrected=(*undone, *own)))
@@ -293,6 +294,7 @@ def accepted(result: SessionResult, inferred: Inferred, before: Identification |
     """
     if not inferred.named or before is None:
         return SessionDiagnosis(inferred.diagnosis, inferred, before)
+    # one finding less changes the sizes and gains of all others: everything is judged again
     while inferred.diagnosis.findings:
         try:
             found = _accepted(result, inferred, before)

@@ -32,6 +32,7 @@ from biodance.records.attention import (
     Doubt,
     Judged,
     Level,
+    NotUsed,
     WrongWeight,
     strongest_first,
     without_path,
@@ -183,7 +184,7 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     else:
         one = _without_faults(one, result, judged, outside)
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
-    others = session_attention(result, one.findings)
+    others = open_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
     return replace(one, attention=(first, *others))
 
@@ -234,12 +235,14 @@ def static_trials(result: SessionResult) -> frozenset[str]:
     return frozenset(one.trial.name for one in result.trials if one.trial.role == "static")
 
 
-def is_well(one: Diagnosis) -> bool:
-    """Return whether nobody has to do anything: the headline is as strong as the strongest sentence below it."""
-    return all(said.level == "note" for said in one.attention)
+def session_attention(result: SessionResult, diagnosis: Diagnosis | None = None) -> tuple[Attention, ...]:
+    """Return all that must be seen of a session: what its ``diagnosis`` says, else what stands open in it, and what was
+    taken off the recordings.
+    """
+    return (*diagnosis.attention, *corrected_attention(result)) if diagnosis else open_attention(result)
 
 
-def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
+def open_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
     """Return every refusal, failed fit, load, warning, and check outside its limit, which points to its cause."""
     found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
     found += [Attention(_level(step), step.text, "", step.name) for step in result.steps if step.status != "done"]
@@ -247,9 +250,7 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
-    warned: dict[str, tuple[Doubt, ...]] = {"session.toml": result.slips, "body": result.doubts}
-    found += [Attention(one.level, one.said, "", about) for about, said in warned.items() for one in said]
-    found += [Attention("note", text, "", "subject") for text in result.unused]
+    found += _noted(result)
     found += [line for trial in result.trials for line in _of_trial(trial, findings)]
     # a reader said of the weight what its check would say again, unless that points to a cause
     told = not cause_of(CheckKind.WEIGHT, findings) and any(map(_weighed, result.trials))
@@ -257,6 +258,14 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
     found += [_habit(one) for one in findings if one.cause.habit]
     return strongest_first([*found, *_load(result, findings), *corrected_attention(result)])
+
+
+def _noted(result: SessionResult) -> list[Attention]:
+    """Return what notes ask somebody to look at: lines of session.toml, then the body; and what was not used."""
+    of_body = result.body.notes if result.body else ()
+    notes = [("session.toml", note) for note in result.session.notes] + [("body", note) for note in of_body]
+    doubts = [Attention(note.level, note.said, "", about) for about, note in notes if isinstance(note, Doubt)]
+    return doubts + [Attention("note", note, "", "subject") for note in of_body if isinstance(note, NotUsed)]
 
 
 def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
@@ -297,9 +306,9 @@ def identified_attention(result: SessionResult, checks: Sequence[QualityCheck]) 
     """Return what must be seen of a session not diagnosed: the ``checks`` that failed stand first."""
     findings = tuple(failed_check(quality) for quality in checks)
     if not findings:
-        return session_attention(result)
+        return open_attention(result)
     one = Diagnosis(False, findings, checks=tuple(checks))
-    others = session_attention(result, findings)
+    others = open_attention(result, findings)
     return (headline(one, (), static_trials(result), others), *others)
 
 

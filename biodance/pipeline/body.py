@@ -1,7 +1,6 @@
 """Who moves: the body scaled by a static trial or stature, its joints, and whether an earlier body is the same's."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +18,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.functional_joints import PLACED, JointGain, functional_joints, with_shown_joints
 from biodance.motion.track import track
 from biodance.pipeline.trial import attempt
-from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, ShownJoints, Step, TrialResult
+from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, Step, TrialResult
 from biodance.records import SIDES, Markers, Sip, Subject, Trial
 from biodance.settings import Settings
 from biodance.uncertainty.caution import in_other_frames
@@ -74,6 +73,7 @@ def _without_static(
     if all(one.trial.markers is None for one in read):
         steps.append(Step("scale", "refused", _NO_MARKERS))
         return None, "No body: no trial has markers."
+    # where there was one, its own refusal has said already why it does not scale the body
     if not had_static:
         steps.append(Step("scale", "refused", _NO_STATIC))
     if not worn:
@@ -158,38 +158,39 @@ _WORDS = {
 }
 
 
-def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -> tuple[Body, ShownJoints]:
-    """Return the body with the joints that moving trials show; as it is where no static trial placed markers."""
+def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -> tuple[Body, tuple[JointGain, ...]]:
+    """Return the body with the joints that moving trials show, and what each brings to the markers; as it is where no
+    static trial placed markers.
+    """
     usable = [one.trial for one in read if one.usable]
     scaled = any(step.name == "scale" and step.status == "done" for step in steps)
     worn = next((trial.marker_set for trial in usable if trial.role == "static"), "") if scaled else ""
     moving = [trial.markers for trial in usable if trial.role != "static" and trial.marker_set == worn]
     recorded = tuple(markers for markers in moving if markers is not None)
     if not worn or not recorded:
-        return body, ShownJoints()
+        return body, ()
     landmarks = read_marker_set(worn).landmarks
     found = attempt(steps, "optional joints", partial(with_shown_joints, body, recorded, landmarks))
     if found is None:
-        return body, ShownJoints()
+        return body, ()
     wider, gains = found
-    return replace(wider, notes=(*body.notes, *map(_sentence, gains))), ShownJoints(gains)
+    return replace(wider, notes=(*body.notes, *map(_sentence, gains))), gains
 
 
-def with_forces(shown: ShownJoints, plain: Body, body: Body, done: tuple[TrialResult, ...]) -> tuple[Body, ShownJoints]:
-    """Return body and joints with what these bring to the forces of every trial, against the ``plain`` body."""
-    if not shown.taken:
-        return body, shown
+def force_gains(plain: Body, done: tuple[TrialResult, ...]) -> tuple[ForceGain, ...]:
+    """Return what the joints shown bring to the forces of every trial, against the ``plain`` body without them."""
     forces = []
     for one in done:
         compared = one.comparison
         if compared is None or one.trial.role == "static" or not compared.used.any():
             continue
+        # the plain body follows the same markers: what it leaves of the forces is without the joints
         motion = attempt([], "track", partial(track, plain, one.trial))
         if motion is not None:
             left = (compared.measured - predict_wrench(plain, motion).value)[compared.used, :3]
             without = tuple(np.sqrt(np.mean(left**2, axis=0)).tolist())
             forces.append(ForceGain(one.name, without, tuple(compared.rms[:3].tolist())))
-    return replace(body, notes=(*body.notes, *_of_forces(forces))), replace(shown, forces=tuple(forces))
+    return tuple(forces)
 
 
 def _sentence(gain: JointGain) -> str:
@@ -198,23 +199,6 @@ def _sentence(gain: JointGain) -> str:
     held = f"left out one at a time, they are foretold to {without} without and to {with_it} with them"
     end = f"The body has {_WORDS[gain.name]}" if gain.taken else "No gain: the body goes without"
     return f"{start}; {held}. {end}."
-
-
-def _of_forces(forces: Sequence[ForceGain]) -> tuple[str, ...]:
-    """Return in one sentence what the joints bring to the forces: horizontal, and vertical."""
-    if not forces:
-        return ()
-    # (trials, 3) N RMS by axis; over the axes squares add up, over the trials their mean counts
-    without, with_them = (np.array([getattr(one, name) for one in forces]) for name in ("without", "with_them"))
-    told = []
-    for name, axes in (("horizontal", slice(0, 2)), ("vertical", slice(2, 3))):
-        before, after = (float(np.sqrt(np.mean(np.sum(x[:, axes] ** 2, axis=1)))) for x in (without, with_them))
-        change = 100 * (after / before - 1)
-        word = "does not change" if abs(change) < 1 else f"{'falls' if change < 0 else 'grows'} by {abs(change):.0f} %"
-        told.append(f"that of the {name} force {word} ({before:.1f} to {after:.1f} N)")
-    return (
-        f"Measured and simulated forces chose none of these joints; their RMS difference with them: {', '.join(told)}.",
-    )
 
 
 ANOTHER_MASS = 0.15

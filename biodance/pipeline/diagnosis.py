@@ -14,16 +14,15 @@ from biodance.discovery import Chosen
 from biodance.effects import Cause, CheckKind, DiscreteEffect, Effect, Recorded, causes, check_quality
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
-from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import UNPLACED_LOAD
 from biodance.inference.session import judge, see
-from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections, with_right_labels
+from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification, load_doubts
-from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out, recorded_of
+from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.session import identified
 from biodance.pipeline.words import LOAD, cause_of, explained
@@ -148,21 +147,16 @@ def diagnose_session(
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
     (``[MyEffect()]``) join the family. Exchanged labels, and faults too large for gates and statistics, are undone in a
-    copy (`with_right_labels`, `with_faults_undone`), named first, and everything else is judged there.
+    copy (`with_faults_undone`), named first, and everything else is judged there.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     tell("looking for faults too large for statistics")
     family = _suspects(effects, result)
-    recorded, right = recorded_of(result), None
-    if LabelsSwapped.name in family:
-        right = with_right_labels(result, recorded, reference=reference, tell=tell)
-    if right is not None:
-        result, recorded = right.result, recorded_of(right.result)
-    mended, recorded = with_faults_undone(result, recorded, right, family, reference=reference, tell=tell)
-    result = identified(mended.result if mended else result, reference=reference, tell=tell)
-    mended = replace(mended, result=result) if mended else None
-    found = _judged(result, recorded, family, reference=reference, tolerances=tolerances, tell=tell)
+    result, recorded, mended = with_faults_undone(result, family, reference=reference, tell=tell)
+    # weighed in the copy: in the session as recorded the segments would carry the fault that was undone
+    result = identified(result, reference=reference, tell=tell)
+    found, looked_at = _judged(result, recorded, family, reference=reference, tolerances=tolerances, tell=tell)
     whole = of_family(found.diagnosis, family)
     cases = found.inferred.search.rows.problem.cases if found.inferred and found.inferred.search.rows.problem else ()
     if cases:
@@ -176,7 +170,7 @@ def diagnose_session(
     weighed = with_weighed_load(result, whole)
     if not any(one.cause.of_person() for one in whole.findings):
         whole = with_load(whole, weighed.identification.search if weighed.identification else None)
-    whole = reconcile_with_checks(whole, weighed, judged_trials(weighed, found.looked_at))
+    whole = reconcile_with_checks(whole, weighed, judged_trials(weighed, looked_at))
     return replace(found, diagnosis=whole, judged=result)
 
 
@@ -196,8 +190,8 @@ def _judged(
     reference: SessionIdentification | None,
     tolerances: Tolerances | None,
     tell: Callable[[str], None],
-) -> SessionDiagnosis:
-    """Return what was found; `reconcile_with_checks` says it."""
+) -> tuple[SessionDiagnosis, frozenset[str]]:
+    """Return what was found, which `reconcile_with_checks` says, and the trials that were compared with a body."""
     fitted = chosen_windows(result.trials)
     tell("checking units, signs, labels and clocks")
     checks = check_quality(recorded, chosen=asked)
@@ -205,6 +199,7 @@ def _judged(
     tell("observing feet on plates, clocks, weights")
     known = tolerances or shipped()
     evidence = collect_evidence(result.session, asked, known.norms)
+    # what feet, clocks and weights measure on spoilt channels has no size
     if any(asked[quality.effect].raw for quality in failed if quality.effect in asked):
         evidence = evidence.only(_ANYWAY)
     bare = Diagnosis(
@@ -214,7 +209,7 @@ def _judged(
     seen, own, looked_at, simulate = None, None, frozenset[str](), not failed
     if result.body is None or not fitted:
         told = (reason for one in result.trials if one.trial.role in FITTED_ROLES for reason in one.reasons)
-        why = f"No movement could be compared with a body. {result.body_source} {' '.join(dict.fromkeys(told))}".strip()
+        why = " ".join(["No movement could be compared with a body.", result.placed.source, *dict.fromkeys(told)])
         bare = replace(bare, notes=(why, *bare.notes))
     else:
         own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
@@ -230,13 +225,13 @@ def _judged(
     found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
     tell("measuring what the findings change")
     before = result.identification.identification if result.identification else None
-    gained = replace(accepted(result, found, before), looked_at=looked_at)
-    return replace(gained, diagnosis=with_failed(failed, gained.diagnosis)) if failed else gained
+    gained = accepted(result, found, before)
+    return replace(gained, diagnosis=with_failed(failed, gained.diagnosis)) if failed else gained, looked_at
 
 
 def _body_reasons(result: SessionResult, own: SessionTolerances) -> dict[Reason, tuple[str, ...]]:
     """Return why forces simulated with this body prove nothing, each reason with what it concerns."""
-    joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
+    joints = result.placed.taken
     # new joints of a sound body may be judged; of a doubtful one they excuse anything
     reasons = {Reason.UNDESCRIBED_JOINTS: joints} if joints and result.doubts else {}
     unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
@@ -271,16 +266,17 @@ def diagnosed_and_corrected(
         found = diagnose_session(result, reference=reference, tolerances=tolerances, tell=tell)
     except BiodanceError:
         return identified(result, reference=reference, tell=tell), None
-    result = found.judged if found.judged and not found.mended else result
+    # a copy in which faults were undone stands for the session only where that is proven
+    result = result if found.mended or found.judged is None else found.judged
     if not result.corrections:
-        result = with_proven_corrections(result, found.inferred, found.mended, reference=reference, tell=tell)
+        result = with_proven_corrections(result, found, reference=reference, tell=tell)
     return identified(result, reference=reference, tell=tell), found
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
     """Return what an earlier session, or the body that this one started from, lets expect; None without either."""
     if reference is None or result.identification is None or reference.identification.status == "failed":
-        return result.prior
+        return result.placed.prior
     return expect_unloaded(reference.identification, result.identification.identification)
 
 

@@ -28,7 +28,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import doubt_told, kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import contact_of, movement_of, prepare_trial
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial_result import TrialResult, WrenchComparison
 from biodance.records import SIDES, Array, Motion, Session, Trial
 from biodance.settings import COP_FORCE
 from biodance.version import __version__
@@ -53,8 +53,7 @@ def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSoli
     FileRefused
         The file exists.
     """
-    if one.motion is None:
-        raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
+    motion = one.moved
     refuse_present(path)
     try:
         import rerun
@@ -73,8 +72,8 @@ def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSoli
             _send(rerun, stream, "lab/markers", markers.time, points.partition(lengths=lengths))
         _forces(rerun, stream, one, body)
         for j, joint in enumerate(body.joints):
-            angle = rerun.Scalars.columns(scalars=one.motion.known_angles[:, j])
-            _send(rerun, stream, f"angles/{joint.name}", one.motion.time, angle)
+            angle = rerun.Scalars.columns(scalars=motion.known_angles[:, j])
+            _send(rerun, stream, f"angles/{joint.name}", motion.time, angle)
         stream.flush()
     return path
 
@@ -85,8 +84,7 @@ def _send(rerun: Any, stream: "RecordingStream", place: str, time: Array, column
 
 def _body(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body, solids: SegmentSolids) -> None:
     """Send the solids, and how they move."""
-    assert one.motion is not None
-    pose, time = poses(body, one.motion.q), one.motion.time
+    pose, time = poses(body, one.moved.q), one.moved.time
     for k, name in enumerate(body.segments):
         if name not in solids:
             continue
@@ -97,13 +95,12 @@ def _body(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body, s
         turn = Rotation.from_matrix(pose.rotation[:, k]).as_quat()
         moved = rerun.Transform3D.columns(translation=pose.position[:, k], quaternion=turn)
         _send(rerun, stream, f"lab/body/{name}", time, moved)
-    centre = centre_of_mass(body, one.motion)
+    centre = centre_of_mass(body, one.moved)
     _send(rerun, stream, "lab/centre_of_mass", time, rerun.Points3D.columns(positions=centre, radii=[0.02] * len(time)))
 
 
 def _forces(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body) -> None:
     """Send plates with their forces at the centres of pressure, and what is unexplained at the centre of mass."""
-    assert one.motion is not None
     arrows = []  # name, times, forces, where they act, colour
     for plate in one.trial.plates:
         corners = [np.vstack([plate.corners, plate.corners[:1]])]
@@ -112,8 +109,8 @@ def _forces(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body)
         arrows.append((plate.name, plate.wrench.time, plate.wrench.force, cop, _MEASURED))
     if one.comparison is not None:
         found = one.comparison
-        left = np.where(found.used[:, None], found.measured - predict_wrench(body, one.motion).value, np.nan)[:, :3]
-        arrows.append(("residual", found.time, left, centre_of_mass(body, one.motion), _RESIDUAL))
+        left = np.where(found.used[:, None], found.measured - predict_wrench(body, one.moved).value, np.nan)[:, :3]
+        arrows.append(("residual", found.time, left, centre_of_mass(body, one.moved), _RESIDUAL))
     for name, time, force, at, colour in arrows:
         known = np.isfinite(force).all(axis=1) & np.isfinite(at).all(axis=1)
         sized = {"vectors": force[known] / _NEWTONS_PER_METRE, "origins": at[known]}
@@ -160,7 +157,7 @@ def results_into_c3d(
     outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre, "x, y, z"))
     contact = contact_of(one, body)
     if one.comparison is not None:
-        outputs += _wrenches(body, one)
+        outputs += _wrenches(body, one, one.comparison)
     if contact is not None:
         outputs += _loads(body, one, contact)
     names = {True: "Foot Strike", False: "Foot Off"}
@@ -196,8 +193,7 @@ def _three(values: Array) -> Array:
 
 def _loads(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
     """Yield moments and powers; NaN where nobody knows what the ground does to the leg's foot."""
-    assert one.motion is not None
-    motion = one.motion
+    motion = one.moved
     ground = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
     torque, rate = joint_torques(body, motion, ground).torque, motion.v[:, body.n_root :]
     for name, columns, axes in _groups(body):
@@ -211,11 +207,8 @@ def _loads(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
         yield Output(f"{name}Power", "POWERS", _three(power), "all axes of the joint", turns=False)
 
 
-def _wrenches(body: Body, one: TrialResult) -> Iterator[Output]:
-    assert one.motion is not None
-    assert one.comparison is not None
-    found = one.comparison
-    for word, wrench in (("Measured", found.measured), ("Predicted", predict_wrench(body, one.motion).value)):
+def _wrenches(body: Body, one: TrialResult, found: WrenchComparison) -> Iterator[Output]:
+    for word, wrench in (("Measured", found.measured), ("Predicted", predict_wrench(body, one.moved).value)):
         value = np.where(found.used[:, None], wrench, np.nan)
         yield Output(f"{word}GroundForce", "FORCES", value[:, :3], "x, y, z of the ground's force on the subject")
         yield Output(f"{word}GroundMoment", "MOMENTS", value[:, 3:], "x, y, z of its moment about the lab origin")
@@ -399,7 +392,7 @@ def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tup
     if target.format == "mot":
         one = result[_chosen(result.session, trial).name]
         if result.body is None or one.motion is None:
-            raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.body_source}")
+            raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.placed.source}")
         return target.coordinates(result.body, one.motion, one.name)
     body, words = body_of_result(result)
     if target.format not in MOTION_FORMATS:
@@ -422,10 +415,10 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
     """
     name = result.session.folder.name
     if result.body is None:
-        raise SessionRefused(f"{result.session.folder}: {result.body_source}")
+        raise SessionRefused(f"{result.session.folder}: {result.placed.source}")
     found = result.identification
     if found is None:
-        return result.body, f"Session {name}: nothing identified. {result.body_source}"
+        return result.body, f"Session {name}: nothing identified. {result.placed.source}"
     trials = ", ".join(found.identification.trials)
     return found.identification.identified, f"Session {name}: inertial parameters identified from {trials}."
 

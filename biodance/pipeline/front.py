@@ -161,9 +161,29 @@ def identify(
     """
     before = _earlier(reference, tell) if reference is not None else None
     result = followed_visit(session, reference=before, body=body, lab=lab, tell=tell)
-    result, _ = diagnosed_and_corrected(result, reference=before, tolerances=read_lab(lab).tolerances, tell=tell)
-    found = identification_of(by_paper(result) if method == "paper" else result)
-    return found if dance is None else replace(found, performance=performance_of(result, dance))
+    known = read_lab(lab).tolerances
+    done = identified_visit(result, reference=before, tolerances=known, dance=dance, method=method, tell=tell)
+    return identification_of(done)
+
+
+def identified_visit(
+    result: SessionResult,
+    *,
+    reference: SessionIdentification | None = None,
+    tolerances: Tolerances | None = None,
+    dance: "Dance | str | Path | None" = None,
+    method: Literal["posterior", "paper"] = "posterior",
+    tell: _Tell = lambda _: None,
+) -> SessionResult:
+    """Return a visit that was `followed` with what `identify` returns. Raises SessionRefused: there is no trial to
+    identify from.
+    """
+    result, _ = diagnosed_and_corrected(result, reference=reference, tolerances=tolerances, tell=tell)
+    result = by_paper(result) if method == "paper" else result
+    found = identification_of(result)
+    if dance is not None:
+        found = replace(found, performance=performance_of(result, dance))
+    return replace(result, identification=found)
 
 
 def diagnose(
@@ -275,6 +295,7 @@ def followed_visit(
 ) -> SessionResult:
     """Return the visit `followed`; one that was examined only where ``body`` or ``lab`` change it."""
     carried, known = read_lab(lab), known_body(body)
+    # nothing that would change an examination that was made: it is not made again
     if isinstance(session, SessionResult) and known is None and not carried.corrections:
         return session if reference is None else _beside(session, reference)
     read = session.session if isinstance(session, SessionResult) else session
@@ -436,6 +457,7 @@ def _hypotheses(moving: _Moving, measured: Forces) -> tuple[Alignment, ...]:
     found = alignments(moving.motion, needed, measured, floor=floor)
     pose = with_height(found[0].pose, soles, measured)
     raised = float(pose.shift[2] - found[0].pose.shift[2])
+    # the lags were searched with the soles on another floor than the plates turn out to have
     if abs(raised) > _RAISED:
         found = alignments(moving.motion, needed, measured, floor=floor + raised)
         pose = with_height(found[0].pose, soles, measured)

@@ -383,7 +383,8 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
     if result.body is None:
-        raise SessionRefused(f"{result.session.folder}: {result.body_source} So nobody knows how the dance was danced.")
+        why = f"{result.placed.source} So nobody knows how the dance was danced."
+        raise SessionRefused(f"{result.session.folder}: {why}")
     fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
     scored = score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
     return replace(scored, logs=read_visit_logs(Path(result.session.folder), one))

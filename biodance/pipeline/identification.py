@@ -77,7 +77,7 @@ def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, 
 
 def mass_check(subject: Subject, weighed: Weighing | None, limits: CheckLimits) -> list[Check]:
     """Compare the mass on the plates with the declared mass, where both are known."""
-    if weighed is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
+    if weighed is None or not np.isfinite(subject.declared_mass):
         return []
     difference = abs(100 * (weighed.mass / subject.mass - 1))
     advice = f"{weighed.mass:.1f} ± {weighed.sd:.1f} kg by {weighed.by.value}: weigh again, or check the plates' zero."
@@ -370,12 +370,14 @@ def identify_trials(
             f"no change is told. {reference.failures['segments']}"
         )
         reference = None
+    # what is wrong with a kept trial cannot be in the body, which was fitted without it
     own = (*checks, *(check for one in results if one.trial.role in FITTED_ROLES for check in one.checks))
     earlier = () if reference is None else (f"Session {reference.name}: {one}" for one in reference.search.doubts)
     doubts = (*load_doubts(own, weighed=reference is not None), *earlier)
     search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
     lies_on = nearest_segment(body, tuple(fit.motion for fit in fits), search.best.segment, search.best.place)
     load = replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference)
+    # after a failed fit the body is the table, and no change since is one of the person
     changes: tuple[Difference, ...] = ()
     if reference is not None and found.status != "failed":
         try:

@@ -29,6 +29,7 @@ _DIFFERENT = "plates and motion differ by more than a wrong body can make of it,
 def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[TrialWindow, ...]:
     """Return trials of some roles with motion and contact, each at its place in time; no rows of postures."""
     asked = [one for one in results if one.trial.role != "static" or "static" in roles]
+    # rows of postures have no time between them: nothing moves, and no clock can be late
     moving = [(one, one.motion) for one in asked if one.motion is not None and not of_postures(one.motion.time)]
     seconds = [float(np.ptp(motion.time[[0, -1]])) for _, motion in moving]
     # from 0 to 1 through all trials in turn: what drifts in a session goes on from one to the next
@@ -123,6 +124,7 @@ def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
         if one.trial.role != "fit":
             continue
         left: dict[LeftOut, float] = {reason: s for reason, s in one.left_out.items() if reason != LeftOut.SHORT_RUN}
+        # a run too short for slow errors of the plates tells of masses all the same
         seconds = one.compared_s + one.left_out.get(LeftOut.SHORT_RUN, 0.0) if one.name in used else 0.0
         why = "" if seconds > 0 else " ".join(one.reasons) or _no_frame(one)
         rows.append(Judged(one.name, seconds, why, missed=bool(why), left_out=left))

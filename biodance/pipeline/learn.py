@@ -34,8 +34,8 @@ from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_in
 from biodance.pipeline.judged_trials import cases_of, chosen_windows
-from biodance.pipeline.lab_file import HealthyReference
-from biodance.pipeline.movement import session_movement
+from biodance.pipeline.lab_file import NO_LAB, HealthyReference
+from biodance.pipeline.movement import describe_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import now
@@ -62,7 +62,7 @@ class MeasuredWalk:
 
 def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
     """Return how the person of an examined ``session`` moved; without EMG, whose size hangs on skin and electrodes."""
-    moved = session_movement(result)
+    moved = describe_movement(result)
     groups = (group for one in moved.repetitions.values() for group in one.groups)
     curves = tuple(group for group in groups if not group.quantity.endswith(EMG))
     found = gait_vectors(moved.gait.curves) if moved.gait else {}
@@ -94,7 +94,6 @@ _WORTH = 5.0
 FEWEST = 3
 """Sessions without which nothing is learned."""
 ROUNDS = 10
-NO_REFERENCE = HealthyReference()
 _Tell = Callable[[str], None]
 
 
@@ -123,7 +122,7 @@ class LearnedLaboratory:
     sessions: tuple[str, ...]
     shown: Mapping[str, float] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
-    healthy: HealthyReference = NO_REFERENCE
+    healthy: HealthyReference = NO_LAB
 
     def __repr__(self) -> str:
         return f"LearnedLaboratory({self.archive.name!r}, {len(self.sessions)} sessions, {self.created})"
@@ -193,6 +192,7 @@ def learn_laboratory(
     for k, (path, name) in enumerate(names.items(), 1):
         tell(f"examining {path.name}, {k} of {len(sessions)}")
         try:
+            # walks count before the checks do: a healthy person may have been recorded with a faulty plate
             result = examine(read_session(path))
             walks.append(measured_walk(result, name))
             found[name] = learned_session(result)
@@ -215,16 +215,17 @@ def learned_session(result: SessionResult) -> LearnedSession:
     """
     windows, session = chosen_windows(result.trials), result.session
     if result.body is None or not windows:
-        raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
+        raise SessionRefused(f"It has no trial that could be judged. {result.placed.source}")
     checks = check_quality(Recorded(session, cases_of(result.body, windows)))
     if failed := [quality for quality in checks if not quality.ok]:
         raise SessionRefused(
             f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
         )
+    # learned are the sizes of causes that have a shipped one to begin with
     put, known = problem(result.body, windows), shipped()
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
-    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+    mass = session.subject.declared_mass
     own = noise_of_instruments(session.trials, soft_tissue(windows), skin_of(result.body, windows))
     seen = [
         SeenValue("camera_noise", name, own.camera, "m"),
@@ -243,7 +244,7 @@ def learned_together(
     archive: Path,
     sessions: list[LearnedSession],
     left_out: Mapping[str, str],
-    healthy: HealthyReference = NO_REFERENCE,
+    healthy: HealthyReference = NO_LAB,
 ) -> LearnedLaboratory:
     """Return what the sessions teach together, beside the ``healthy`` reference. Raises SessionRefused: fewer than
     three sessions, and no band of healthy people.

@@ -147,6 +147,7 @@ class LiveSession:
         if (frame + 1) % self._hop == 0:
             recent = np.array(self._distance[-max(3, round(_RECENT * self.markers.rate)) :])
             self._watch.look_at_markers(self._now, self._xyz[frame], recent)
+        # a window is begun only when the one before is done: late work must not pile up
         if self._work is None and frame + 1 >= self._window and (frame + 1 - self._window) % self._hop == 0:
             self._work = self._take(frame + 1, frame + 1 - self._delay)
         if self._work is not None:

@@ -1,19 +1,19 @@
 """What moved in a visit: every trial's events, cycles and curves, with the parameters that the visit identified."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from biodance import display
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.scores import DeviationReference, GaitScores, NormalCurve, gait_scores
+from biodance.cycles.scores import GaitScores, gait_scores
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
-from biodance.pipeline.lab_file import read_lab
+from biodance.pipeline.lab_file import NO_LAB, HealthyReference, read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import movement_of
@@ -41,12 +41,8 @@ class SessionMovement:
         kg that moments and powers are divided by: of that body.
     left_out : mapping
         Trial -> why nothing is told of its movement.
-    normal : tuple of NormalCurve
-        Bands of the laboratory's own people to be shown behind (`learn_laboratory`).
-    normal_beside : tuple of NormalCurve
-        The same of plug-in gait's own angles: its scores are told against these.
-    deviation : DeviationReference or None
-        What the gait deviation index is told against.
+    healthy : HealthyReference
+        Bands of the laboratory's own people to be shown behind, and what scores are told against (`learn_laboratory`).
 
     Examples
     --------
@@ -59,9 +55,7 @@ class SessionMovement:
     parameters: str
     mass: float
     left_out: dict[str, str]
-    normal: tuple[NormalCurve, ...] = ()
-    normal_beside: tuple[NormalCurve, ...] = ()
-    deviation: DeviationReference | None = None
+    healthy: HealthyReference = NO_LAB
 
     def __repr__(self) -> str:
         said = ", ".join(f"{one.trial} {one.told}" for one in self.trials if one.cycles)
@@ -93,8 +87,8 @@ class SessionMovement:
         """Gait scores of our angles and of those in the files; None without a reference."""
         if self.gait is None:
             return None, None
-        ours = gait_scores(self.gait.curves, self.normal, self.deviation)
-        return ours, gait_scores(self.gait.file_curves, self.normal_beside)
+        ours = gait_scores(self.gait.curves, self.healthy.normal, self.healthy.deviation)
+        return ours, gait_scores(self.gait.file_curves, self.healthy.beside)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.
@@ -132,15 +126,23 @@ class SessionMovement:
         """
         import pandas as pd
 
-        rows = [
-            (one.trial, name, STRIDE_UNITS[name], side, *values)
-            for one in self.trials
-            for side in ("both", "left", "right")
-            for name, values in one.spatiotemporal(side).items()
-        ]
-        return pd.DataFrame(rows, columns=["trial", "quantity", "unit", "side", "mean", "sd", "count"])
+        rows = [{"trial": one.trial, **row} for one in self.trials for row in spatiotemporal_rows(one)]
+        return pd.DataFrame(rows, columns=["trial", *_SPREAD])
 
 
+_SPREAD = ("quantity", "unit", "side", "mean", "sd", "count")
+
+
+def spatiotemporal_rows(one: TrialMovement) -> list[dict[str, Any]]:
+    """Return the spatio-temporal values of a trial, a row for each quantity of both feet and of either."""
+    return [
+        dict(zip(_SPREAD, (name, STRIDE_UNITS[name], side, *values), strict=True))
+        for side in ("both", "left", "right")
+        for name, values in one.spatiotemporal(side).items()
+    ]
+
+
+@one_thread()
 def describe_movement(
     session: Session | SessionResult | str | Path,
     *,
@@ -187,22 +189,17 @@ def describe_movement(
     if not isinstance(session, SessionResult):
         read = session if isinstance(session, Session) else read_session(session, tell=tell)
         session = examine(read, tell=tell)
-    known = read_lab(lab)
-    moved = session_movement(session, tell=tell)
-    return replace(moved, normal=known.normal, normal_beside=known.beside, deviation=known.deviation)
-
-
-@one_thread()
-def session_movement(session: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionMovement:
-    """Return what moved in an examined session; see `describe_movement`."""
+    healthy, body = read_lab(lab), session.body
     sip = session.identification.proven if session.identification else None
     trials, left_out = [], {}
     for k, one in enumerate(session.trials, 1):
         tell(f"describing {one.name}, {k} of {len(session.trials)}")
         try:
-            trials.append(movement_of(one, session.body, sip))
+            trials.append(movement_of(one, body, sip))
         except BiodanceError as why:
             left_out[one.name] = str(why)
-    mass = sip if sip is not None else session.body.sip if session.body else None
-    kg = float(mass.mass.sum()) if mass is not None else float("nan")
-    return SessionMovement(session.session.folder.name, tuple(trials), "identified" if sip else "table", kg, left_out)
+    # moments and powers are divided by the mass of the body that they are computed with
+    used = sip if sip is not None else body.sip if body else None
+    kg = float(used.mass.sum()) if used is not None else float("nan")
+    parameters = "table" if sip is None else "identified"
+    return SessionMovement(session.session.folder.name, tuple(trials), parameters, kg, left_out, healthy)

@@ -133,8 +133,7 @@ def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[Plat
     try:
         session = read_session(path)
         visit = PlateVisit(name, session.subject.name, visit_date(path))
-        mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-        found = list(plate_evidence(session.trials, visit, mass=mass))
+        found = list(plate_evidence(session.trials, visit, mass=session.subject.declared_mass))
     except Exception as why:
         refused[name] = told_failure(why)
         return []

@@ -115,16 +115,15 @@ def _recorded(trial: Trial, place: Path, subject: str) -> None:
 
 
 def _found(one: TrialResult, body: Body, place: Path, subject: str) -> None:
-    assert one.motion is not None
-    task, stem = bids_label(one.name), _stem(subject, one.name)
+    motion, task, stem = one.moved, bids_label(one.name), _stem(subject, one.name)
     about = {"TrackingSystemName": _SYSTEM, "Description": "joint angles and centre of mass of a tracked body"}
-    about["Missing"] = " ".join(state_notes(one.motion)) or "none"
+    about["Missing"] = " ".join(state_notes(motion)) or "none"
     # angles in deg and centre of mass in m; empty where the markers do not determine the posture
-    known = np.where(one.motion.determined[:, None], 1.0, np.nan)
+    known = np.where(motion.determined[:, None], 1.0, np.nan)
     rows = [(joint.name, "n/a", "JNTANG", joint.name, "deg", "joint") for joint in body.joints]
     rows += [(f"centre_of_mass_{axis}", axis, "POS", "centre_of_mass", "m", "lab") for axis in COMPONENTS]
-    values = np.hstack([one.motion.known_angles, known * centre_of_mass(body, one.motion)])
-    joints = BidsChannels(one.motion.time, values, rows)
+    values = np.hstack([motion.known_angles, known * centre_of_mass(body, motion)])
+    joints = BidsChannels(motion.time, values, rows)
     write_motion(place, f"{stem}_desc-joints", joints, task=task, about=about)
     events = [(e.time, f"{e.side}_{'strike' if e.down else 'off'}") for e in movement_of(one, body, None).events]
     write_events(place, f"{stem}_desc-feet", events)
@@ -220,8 +219,7 @@ def write_opensim_folder(
 
 
 def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
-    motion, name = one.motion, one.name
-    assert motion is not None
+    motion, name = one.moved, one.name
     table, notes = opensim_coordinates(body, motion), state_notes(motion)
     files = [write_mot(folder / f"{name}.mot", table, notes=notes).name]
     if one.trial.markers is not None:

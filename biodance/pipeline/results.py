@@ -6,7 +6,8 @@ about the lab origin.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from biodance.effects._base.exchange_spans import Pair, Spans
 from biodance.identification.identification import Identification
 from biodance.inference.decision import Inferred
 from biodance.lab.plates.faults import PlateCorrection
+from biodance.motion.ik.functional_joints import JointGain
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.trial_result import ON_A_FRAME, Check, ShownJoints, Step, Still, TrialResult, Weighing
+from biodance.pipeline.trial_result import ON_A_FRAME, Check, ForceGain, Step, TrialResult, Weighing, forces_told
 from biodance.records import Mask, Session, Sip, Subject, by_name
-from biodance.records.attention import Doubt, NotUsed
+from biodance.records.attention import Doubt
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -34,20 +36,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The ``body`` of a ``subject`` with the joints that its markers ``shown``, ``plain`` without them, its ``source``
-    in words, its ``prior``, and the ``steps`` to it; from the ``known`` body of an earlier session where there is one.
-    Frames ``hidden`` (T,) of each trial, in which something else carries, placed no joint.
+    """Who moves: the ``body`` with the joints that its markers show (``gains`` says what each brings to them), its
+    ``source`` in words, ``plain`` without these joints, what is known of it before (``prior``; None for the table), and
+    the ``steps`` to it; from the ``known`` body of an earlier session where there is one. Frames ``hidden`` (T,) of
+    each trial, in which something else carries, placed no joint.
     """
 
-    subject: Subject
-    known: Body | None
-    hidden: tuple[Mask, ...]
     body: Body | None
-    plain: Body | None
     source: str
-    prior: Sip | None
-    shown: ShownJoints
-    steps: tuple[Step, ...]
+    plain: Body | None = None
+    gains: tuple[JointGain, ...] = ()
+    prior: Sip | None = None
+    steps: tuple[Step, ...] = ()
+    known: Body | None = None
+    hidden: tuple[Mask, ...] = ()
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """Names of the joints beyond the usual axes that the body has."""
+        return tuple(gain.name for gain in self.gains if gain.taken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +64,9 @@ class SessionResult:
     Parameters
     ----------
     session : Session
-        As read.
-    subject : Subject
-        The person.
-    body : Body or None
-        That moved; None: no markers, mass or stature.
-    body_source : str
-        Where the body comes from, in words.
+        As read, less ``corrections``, with the mass that the plates weighed where nobody declared one.
+    placed : Placed
+        Who moves, where that body comes from, and what was known of it before.
     steps : tuple
         What was done with the session, and what was refused with the reason.
     trials : tuple
@@ -72,24 +75,14 @@ class SessionResult:
         The session's own rows of the quality table.
     standing : Standing or None
         The quiet standing that shows the centre of mass over the centre of pressure, or None.
-    still : Still or None
-        One instant to draw, or None.
     identification : SessionIdentification or None
         None where no trial is to be identified from, or it was refused.
-    more_stills : tuple of Still
-        The frame with the largest residual force, and a load that was found.
-    prior : Sip or None
-        What an earlier session lets expect of the body; None where that is the table.
     weighed : Weighing or None
         The mass on the plates that is compared with the declared one, by standing, strides or Newton; None without.
-    shown_joints : ShownJoints
-        The joints beyond its 23 axes that the body has because its markers show them, and what each brings.
-    known : Body or None
-        The body of an earlier session that it started from; None for the table's.
     corrections : tuple of PlateCorrection
         What was taken off the plates of ``session`` before all stages.
-    placed : Placed or None
-        How the body came about, for another examination of the same markers.
+    joint_forces : tuple of ForceGain
+        What the joints that markers show bring to the forces of every trial; () where they show none.
 
     Examples
     --------
@@ -100,22 +93,15 @@ class SessionResult:
     """
 
     session: Session
-    subject: Subject
-    body: Body | None
-    body_source: str
+    placed: Placed
     steps: tuple[Step, ...]
     trials: tuple[TrialResult, ...]
-    checks: tuple[Check, ...]
-    standing: QuietStanding | None
-    still: Still | None
+    checks: tuple[Check, ...] = ()
+    standing: QuietStanding | None = None
     identification: SessionIdentification | None = None
-    more_stills: tuple[Still, ...] = ()
-    prior: Sip | None = None
     weighed: Weighing | None = None
-    shown_joints: ShownJoints = field(default_factory=ShownJoints)
-    known: Body | None = None
     corrections: tuple[PlateCorrection, ...] = ()
-    placed: Placed | None = None
+    joint_forces: tuple[ForceGain, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -124,7 +110,18 @@ class SessionResult:
         )
 
     def _repr_html_(self) -> str:
-        return display.card(repr(self), self.table(), [self.body_source])
+        return display.card(repr(self), self.table(), [self.placed.source])
+
+    @property
+    def subject(self) -> Subject:
+        """The person."""
+        return self.session.subject
+
+    @cached_property
+    def body(self) -> Body | None:
+        """That moved, with a note on what its joints bring to the forces; None: no markers, mass or stature."""
+        body, said = self.placed.body, forces_told(self.joint_forces)
+        return replace(body, notes=(*body.notes, *said)) if body is not None and said else body
 
     @property
     def scaled(self) -> bool:
@@ -172,12 +169,7 @@ class SessionResult:
     @property
     def mass_difference(self) -> float:
         """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
-        return 100 * (self.weighed.mass / self.declared_mass - 1) if self.weighed else float("nan")
-
-    @property
-    def declared_mass(self) -> float:
-        """The declared body mass, kg; NaN where nobody declared it."""
-        return float("nan") if "mass" in self.subject.guessed else self.subject.mass
+        return 100 * (self.weighed.mass / self.subject.declared_mass - 1) if self.weighed else float("nan")
 
     @property
     def stopped(self) -> bool:
@@ -190,34 +182,15 @@ class SessionResult:
         return tuple(note for note in (self.body.notes if self.body else ()) if isinstance(note, Doubt))
 
     @property
-    def unused(self) -> tuple[str, ...]:
-        """What was typed of the subject and contradicted by the markers, so that theirs was taken."""
-        return tuple(note for note in (self.body.notes if self.body else ()) if isinstance(note, NotUsed))
-
-    @property
-    def slips(self) -> tuple[Doubt, ...]:
-        """What the session's notes warn about: lines of session.toml that fit no recording."""
-        return tuple(note for note in self.session.notes if isinstance(note, Doubt))
-
-    @property
     def failures(self) -> Mapping[str, str]:
         """What identification could not compute, each with cause and cure."""
         return self.identification.failures if self.identification else {}
 
-    @property
-    def needs_a_person(self) -> bool:
-        """Whether anything was refused, warned about, not computed or outside its limit."""
-        open_ = any(not doubt.mended for doubt in (*self.doubts, *self.slips))
-        said = self.failures or self.session.refused or open_
-        undone = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
-        return bool(said) or undone or any(not check.inside for check in self.all_checks)
-
 
 @dataclass(frozen=True, eq=False)
 class MendedCopy:
-    """A session ``result`` with faults undone in a copy: labels ``exchanged``, and ``checks`` that name all."""
+    """What was undone in a copy of a session: labels ``exchanged``, and the ``checks`` that name all."""
 
-    result: SessionResult
     exchanged: Mapping[str, Mapping[Pair, Spans]]
     checks: tuple[QualityCheck, ...]
 
@@ -243,8 +216,6 @@ class SessionDiagnosis:
         was found; None where nothing was undone.
     gain : Gain or None
         Of all findings together on the kept trials; each has its own.
-    looked_at : frozenset of str
-        Trials whose forces were compared with a body.
     judged : SessionResult or None
         The session in which all was found, with what its segments weigh: as it was examined, or that of ``mended``.
 
@@ -262,7 +233,6 @@ class SessionDiagnosis:
     failures: Mapping[str, str] = field(default_factory=dict)
     mended: MendedCopy | None = None
     gain: Gain | None = None
-    looked_at: frozenset[str] = frozenset()
     judged: SessionResult | None = None
 
     def __repr__(self) -> str:

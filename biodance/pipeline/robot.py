@@ -229,33 +229,48 @@ def identify_robot(
         raise TrialRefused(reasons)
     tell("identifying")
     name = found.folder.name
-    plain = _identified(body, name, fitted, kept)
+    plain, alone = _identified(body, name, fitted, kept)
     tell("looking for what is not as drawn")
-    causes, mended = robot_causes(body, tuple(fitted), tuple(kept))
-    count = len(fitted)
-    best = _identified(body, name, mended[:count], mended[count:]) if causes else plain
-    doubtful = bool(causes) and _residual_rms(best[0]) >= _residual_rms(plain[0])
-    best, named = (plain, ()) if doubtful else (best, causes)
-    wrong = misweighed(best[0])
-    words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best[0].identification))
+    found_causes, mended = robot_causes(body, tuple(fitted), tuple(kept))
+    causes: tuple[RobotFinding, ...] = ()
+    best, used = plain, (*fitted, *kept)
+    if found_causes:
+        count = len(fitted)
+        other, other_alone = _identified(body, name, mended[:count], mended[count:])
+        # named only where the motion that was kept is predicted better without them
+        if _residual_rms(other) < _residual_rms(plain):
+            causes, best, alone, used = found_causes, other, other_alone, mended
+    doubtful = bool(found_causes) and not causes
+    seen, wrong = (*best.fitted, *best.validations), misweighed(best)
+    in_root = {v.name: _in_root(one, v) for one, v in zip(used, seen, strict=bool(seen))}
+    words = (*cause_words(found_causes, doubtful=doubtful), *wrong, *weights(best.identification))
     lost = [Attention("warn", why, name, "trial") for name, why in refused.items()]
     said = strongest_first([*of_file(body.notes), *lost, *attention_of(trials), *words])
     judged = tuple(Judged(one.recorded.name, float(one.fit.use.sum()) / RATE) for one in trials)
     missed = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
-    verdict = "named" if named else "unexplained" if doubtful or wrong else "clean"
-    return RobotResult(found, Path(urdf), body, tuple(trials), *best, named, said, (*judged, *missed), verdict)
+    verdict = "named" if causes else "unexplained" if doubtful or wrong else "clean"
+    return RobotResult(
+        found, Path(urdf), body, tuple(trials), best, alone, in_root, causes, said, (*judged, *missed), verdict
+    )
 
 
-_Found = tuple[SessionIdentification, BaseEstimate, dict[str, tuple[Agreement, Agreement]]]
-"""What some trials give: ``identified``, ``alone`` and ``in_root`` of `RobotResult`."""
-
-
-def _identified(body: Body, name: str, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]) -> _Found:
-    """Identify from the ``fitted`` trials, validate on all."""
+def _identified(
+    body: Body, name: str, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]
+) -> tuple[SessionIdentification, BaseEstimate]:
+    """Identify from the ``fitted`` trials, beside what drawing and identified robot predict of every trial; and the
+    base parameters as `RobotResult.alone`.
+    """
     done, alone = identify_links(body, tuple(fitted))
-    identified = _validated(name, done, fitted, kept)
-    seen = (*identified.fitted, *identified.validations)
-    return identified, alone, {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept), seen, strict=bool(seen))}
+    search = LoadSearch((), float("nan"), "the drawing", doubts=(_NO_SEARCH,))
+    one = SessionIdentification(name, done, (), (), {}, None, search, notes=done.notes)
+    if done.status == "failed":
+        return replace(one, failures={"links": done.cause}), alone
+    first, last = (tuple(_validation(done, trial) for trial in some) for some in (fitted, kept))
+    notes = list(done.notes)
+    gain = kept_gain(last, notes)
+    agreements = {trial.name: trial.identified_agreement for trial in (*first, *last)}
+    told = replace(one, fitted=first, validations=last, agreements=agreements, gain=gain, notes=tuple(notes))
+    return told, alone
 
 
 def _residual_rms(one: SessionIdentification) -> float:
@@ -282,22 +297,6 @@ def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], li
         first.append(replace(one, fit=replace(one.fit, use=one.fit.use & early)))
         last.append(replace(one, fit=replace(one.fit, use=one.fit.use & ~early)))
     return first, last
-
-
-def _validated(
-    name: str, done: Identification, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]
-) -> SessionIdentification:
-    """Return the identification beside what drawing and identified robot predict of every trial."""
-    search = LoadSearch((), float("nan"), "the drawing", doubts=(_NO_SEARCH,))
-    if done.status == "failed":
-        return SessionIdentification(
-            name, done, (), (), {}, None, search, notes=done.notes, failures={"links": done.cause}
-        )
-    first, last = (tuple(_validation(done, one) for one in some) for some in (fitted, kept))
-    notes = list(done.notes)
-    gain = kept_gain(last, notes)
-    agreements = {one.name: one.identified_agreement for one in (*first, *last)}
-    return SessionIdentification(name, done, first, last, agreements, gain, search, notes=tuple(notes))
 
 
 def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:

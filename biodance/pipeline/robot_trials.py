@@ -87,6 +87,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
     base = recording.base
     seen = _base_from_imu(one, base, time)
     grounded, fit = _grounded_motion(body, time, angle, measured, base=seen)
+    # the plate decides only what the angles leave open
     if grounded.unclear.any() and fit.correlation < _FAITHFUL:
         grounded, fit = _stood_by_plate(body, time, angle, measured, seen)
     if base.markers:
@@ -94,6 +95,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
     odd = innovation(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
+    # looked for also where the plate seems foreign: exchanged columns make it seem so
     if odd > ODD or fit.correlation < _FAITHFUL:
         pair = _exchanged(body, time, angle, measured, limits)
         if pair and _explains(body, time, angle, measured, pair):

@@ -5,7 +5,7 @@ import os
 import platform
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -36,24 +36,6 @@ LIBRARIES = (
 _UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files
-    and machine; ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it;
-    ``versions`` library -> version; ``blas`` that numpy multiplies matrices with; ``inputs`` file name -> sha256;
-    ``settings`` dotted key -> value, all of them; ``visit`` the ``date``, ``lab``, ``operator`` and ``condition`` of
-    the session, "" where nobody says.
-    """
-
-    created: str
-    commit: str
-    versions: Mapping[str, str]
-    blas: str
-    inputs: Mapping[str, str]
-    settings: Mapping[str, Value]
-    visit: Mapping[str, str] = field(default_factory=dict)
-
-
 def now() -> str:
     """Return the present UTC time to the second, ISO 8601."""
     return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -70,8 +52,15 @@ def blas() -> str:
     return " ".join([said, *sorted(kernels)])
 
 
-def provenance(result: SessionResult, *, created: str) -> Provenance:
-    """Collect the provenance of ``result``; ``created`` is the UTC time to write into it (see `now`)."""
+def provenance(result: SessionResult, *, created: str) -> dict[str, Any]:
+    """Return which software made a ``result``, from which files, with which settings.
+
+    ``created_utc`` (see `now`) is the only thing that differs when the same software runs again on the same files and
+    machine; ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it;
+    ``versions`` library -> version; ``blas`` that numpy multiplies matrices with; ``inputs_sha256`` by file name;
+    ``settings`` dotted key -> value, all of them; ``visit`` the ``date``, ``lab``, ``operator`` and ``condition`` of
+    the session, "" where nobody says.
+    """
     versions = {"biodance": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         try:
@@ -82,8 +71,15 @@ def provenance(result: SessionResult, *, created: str) -> Provenance:
     for source in (trial.trial.source for trial in result.trials):
         inside = source.path.is_relative_to(folder)
         inputs[source.path.relative_to(folder).as_posix() if inside else source.path.name] = source.sha256
-    visit = visit_words(folder, [trial.name for trial in result.trials])
-    return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict(), visit)
+    return {
+        "created_utc": created,
+        "commit": commit(),
+        "versions": versions,
+        "blas": blas(),
+        "inputs_sha256": inputs,
+        "settings": result.settings.as_dict(),
+        "visit": visit_words(folder, [trial.name for trial in result.trials]),
+    }
 
 
 BODY_FILE = "body.json"

@@ -14,7 +14,7 @@ from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.plates.faults import PlateCorrection, corrected_trial
 from biodance.motion.contact import carried_elsewhere
 from biodance.motion.newton import QuietStanding
-from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
+from biodance.pipeline.body import body_of, force_gains, refuse_another_reference, shown_joints, starting_from
 from biodance.pipeline.identification import (
     FITTED_ROLES,
     SessionIdentification,
@@ -29,9 +29,8 @@ from biodance.pipeline.identification import (
     with_weighed_mass,
 )
 from biodance.pipeline.results import Placed, SessionResult
-from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
+from biodance.pipeline.trial_result import Step, TrialResult
 from biodance.records import Markers, Session
 from biodance.threads import one_thread
 
@@ -64,10 +63,7 @@ def _examined(
 
 
 def _placed(
-    session: Session,
-    read: tuple[TrialResult, ...],
-    known: Body | None,
-    earlier: tuple[Placed, tuple[TrialResult, ...]] | None,
+    session: Session, read: tuple[TrialResult, ...], known: Body | None, earlier: SessionResult | None
 ) -> Placed:
     """Return who moves in the prepared trials ``read`` of a session; the body of an ``earlier`` examination where its
     trials have the same markers, and nothing else carries in other frames. SessionRefused where the ``known`` body is
@@ -81,23 +77,23 @@ def _placed(
         for one in read
     )
     if earlier is not None:
-        before, trials = earlier
+        before = earlier.placed
         # scaling and joints rest on markers, person and hidden frames alone: equal ones give an equal body
-        same = before.subject == subject and before.known is known and all(map(np.array_equal, hidden, before.hidden))
-        if same and _same_markers(read, trials):
+        same = earlier.subject == subject and before.known is known and all(map(np.array_equal, hidden, before.hidden))
+        if same and _same_markers(read, earlier.trials):
             return before
     steps: list[Step] = []
-    body, source = body_of(subject, read, session.settings, steps)
+    plain, source = body_of(subject, read, session.settings, steps)
+    if plain is None:
+        return Placed(None, source, steps=tuple(steps), known=known, hidden=hidden)
     prior = None
-    if body is not None and known is not None:
-        body, prior, source = starting_from(known, body, subject.mass, source)
-    elif body is not None:
-        body, limbs = with_declared_limbs(body, subject)
+    if known is not None:
+        plain, prior, source = starting_from(known, plain, subject.mass, source)
+    else:
+        plain, limbs = with_declared_limbs(plain, subject)
         source = f"{source} {limbs}".strip()
-    plain, shown = body, ShownJoints()
-    if body is not None:
-        body, shown = shown_joints(body, read, steps)
-    return Placed(subject, known, hidden, body, plain, source, prior, shown, tuple(steps))
+    body, gains = shown_joints(plain, read, steps)
+    return Placed(body, source, plain, gains, prior, tuple(steps), known, hidden)
 
 
 def _same_markers(some: tuple[TrialResult, ...], others: tuple[TrialResult, ...]) -> bool:
@@ -194,34 +190,25 @@ def followed(
         prepared.append(prepare_trial(trial))
     read = tuple(prepared)
     tell("scaling the body")
-    before = earlier.placed if earlier is not None else None
-    placed = _placed(session, read, known, (before, earlier.trials) if before and earlier else None)
-    body, shown = placed.body, placed.shown
+    placed = _placed(session, read, known, earlier)
+    body, mass = placed.body, session.subject.mass
     if body is not None and reference is not None:
-        refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
-    same = earlier.trials if earlier and placed is before else tuple(repeat(None, len(read)))
-    done = _examined(read, body, session.subject.mass, same, tell)
-    if body is not None and placed.plain is not None:
-        body, shown = with_forces(shown, placed.plain, body, done)
-    steps, standing = list(placed.steps), best_standing(done)
-    weighed, limits = attempt(steps, "weighing", lambda: weigh(session, standing)), session.settings.checks
+        refuse_another_reference(reference.identification.body, body, mass, reference.name)
+    # the same body follows the same markers as before: what it did is not computed again
+    same = earlier.trials if earlier and placed is earlier.placed else tuple(repeat(None, len(read)))
+    done = _examined(read, body, mass, same, tell)
+    steps, standing, limits = list(placed.steps), best_standing(done), session.settings.checks
+    weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
     return SessionResult(
-        session=session,
-        subject=session.subject,
-        body=body,
-        body_source=placed.source,
-        steps=tuple(steps),
-        trials=done,
+        session,
+        placed,
+        tuple(steps),
+        done,
         checks=(*mass_check(session.subject, weighed, limits), *standing_check(standing, limits)),
         standing=standing,
         weighed=weighed,
-        still=attempt([], "still", lambda: still_of(body, done)) if body else None,
-        identification=None,
-        prior=placed.prior,
-        shown_joints=shown,
-        known=known,
         corrections=corrections,
-        placed=placed,
+        joint_forces=force_gains(placed.plain, done) if placed.plain is not None and placed.taken else (),
     )
 
 
@@ -231,7 +218,7 @@ def identify_result(
     """Identify the ``body`` of a `followed` session, beside an earlier one; see `identify_trials`."""
     return identify_trials(
         body, result.trials, name=result.session.folder.name, reference=reference, checks=result.checks,
-        prior=result.prior, corrections=result.corrections, weighed=result.weighed,
+        prior=result.placed.prior, corrections=result.corrections, weighed=result.weighed,
     )  # fmt: skip
 
 
@@ -242,20 +229,14 @@ def identified(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Return a `followed` session with what its segments weigh, and its worst frames, unless it has them."""
-    if result.identification is not None or any(step.name == "identify" for step in result.steps):
+    """Return a `followed` session with what its segments weigh, unless it has that, or there is nothing to weigh by."""
+    body, steps = result.body, list(result.steps)
+    known = result.identification is not None or any(step.name == "identify" for step in steps)
+    if known or body is None or not can_identify(result.trials):
         return result
-    body, done, steps, identification = result.body, result.trials, list(result.steps), None
-    if body is not None and can_identify(done):
-        tell("identifying the segments")
-        identification = attempt(steps, "identify", lambda: identify_result(result, body, reference))
-    more: tuple[Still | None, ...] = ()
-    if body is not None:  # the worst frame of the body that is believed, and the load that was found
-        solved = identification is not None and identification.identification.status == "solved"
-        worst = worst_still(identification.identification.identified if identification and solved else body, done)
-        more = (worst, load_still(body, done, identification.search) if identification and worst else None)
-    stills = tuple(still for still in more if still is not None)
-    return replace(result, steps=tuple(steps), identification=identification, more_stills=stills)
+    tell("identifying the segments")
+    found = attempt(steps, "identify", lambda: identify_result(result, body, reference))
+    return replace(result, steps=tuple(steps), identification=found)
 
 
 def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding | None:

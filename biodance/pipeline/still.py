@@ -1,21 +1,17 @@
 """What is drawn of a body: outlines, bones, an instant, a posture that is asked for, a session frame by frame."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.solids import box_solid, shape_parts
-from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.load_words import size_and_segments
-from biodance.identification.validation import TrialValidation
 from biodance.library import locate, read_toml
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
@@ -23,7 +19,6 @@ from biodance.motion.newton import facing
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Still, TrialResult
 from biodance.records import SIDES, Array, Motion, side_in_name
-from biodance.spatial import zero_moment_point
 
 
 def parent_segments(body: Body) -> list[int]:
@@ -87,13 +82,26 @@ def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[st
     return out
 
 
-def still_of(body: Body, results: tuple[TrialResult, ...]) -> Still:
-    """Return the middle frame of the first static trial with a motion, else of the first trial with one. Raises
-    TrialRefused: no trial has a motion.
+def stills_of(result: SessionResult) -> tuple[Still, ...]:
+    """Return what is drawn of a session, first what shows most: the worst frame of the body that is believed, a frame
+    of standing, and the load that was found; () where nothing moves.
     """
+    body, found = result.body, result.identification
+    usual = _usual_still(body, result.trials) if body is not None else None
+    if body is None or usual is None:
+        return ()
+    # beside the paper's programme it is the posterior that is believed
+    one = (found.posterior or found).identification if found else None
+    worst = worst_still(one.identified if one and one.status == "solved" else body, result.trials)
+    load = load_still(body, result.trials, found.search) if found and worst else None
+    return tuple(still for still in (worst, usual, load) if still is not None)
+
+
+def _usual_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
+    """Return the middle frame of the first static trial with a motion, else of the first trial with one."""
     one = _drawn_first(results)
     if one is None or one.motion is None or one.trial.markers is None:
-        raise TrialRefused("No trial has a tracked motion, so there is no body to draw.")
+        return None
     return still_at(body, one, one.motion.time.size // 2)
 
 
@@ -104,8 +112,7 @@ def _drawn_first(results: tuple[TrialResult, ...]) -> TrialResult | None:
 
 def still_at(body: Body, one: TrialResult, frame: int) -> Still:
     """Return one frame of a trial that has markers and a motion."""
-    trial, motion = one.trial, one.motion
-    assert motion is not None
+    trial, motion = one.trial, one.moved
     assert trial.markers is not None
     force, cop = np.full(3, np.nan), np.full(3, np.nan)
     if trial.plates:
@@ -126,6 +133,7 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
     """Return a posture ``q`` (nq,) alone: bones, boxes and centre of mass, without markers, plates or forces."""
     motion = Motion(np.zeros(1), q[None], np.zeros((1, body.nv)), np.zeros((1, body.nv)))
     com, body = centre_of_mass(body, motion)[0], parts_as_segments(body)
+    # head and torso are shapes of one segment: drawn apart, they turn together
     pose, nothing, parts = poses(body, q), np.full(3, np.nan), shape_parts(body)
     on = [segment for segment, _ in parts]
     lines, sides = bone_lines(body, pose)
@@ -172,14 +180,13 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
 
 def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch) -> Still | None:
     """Return the still of the body with the load that was found, where it sits; None where that is not known."""
-    one, load = _drawn_first(results), _load_place(body, search)
+    one, load = _drawn_first(results), load_place(body, search)
     if load is None or one is None or one.motion is None:
         return None
     pose, (segment, place) = poses(body, one.motion.q[one.motion.time.size // 2]), load
     about = f"The load that was found (yellow): {size_and_segments(search)}."
-    return replace(
-        still_of(body, results), load=pose.position[0, segment] + pose.rotation[0, segment] @ place, about=about
-    )
+    drawn = still_at(body, one, one.motion.time.size // 2)
+    return replace(drawn, load=pose.position[0, segment] + pose.rotation[0, segment] @ place, about=about)
 
 
 @cache
@@ -211,124 +218,7 @@ def asked_posture(body: Body, segment: str) -> Array:
     return q
 
 
-_FASTEST, _FRAMES = 25.0, 3000
-"""Hz of a replay at most, and its frames in all trials together: a page stays small however long the session."""
-
-
-@dataclass(frozen=True, eq=False)
-class TrialReplay:
-    """One trial at the frames (F) shown, m and N in the lab frame, NaN = not known.
-
-    ``time`` (F,) s; ``positions`` (F, N, 3) and ``rotations`` (F, N, 4), quaternions x y z w, of the segments;
-    ``markers`` (F, K, 3); ``com`` (F, 3); ``measured`` and ``simulated`` (F, 2, 3) force and centre of pressure, with
-    ``parameters`` "identified" or "table"; ``residual`` (F, 3) N measured less simulated, of fully measured frames;
-    ``plates`` (P, 4, 3) corners; ``worst`` s at which the residual is largest (NaN: nowhere measured);
-    ``state`` (F,) `AngleState` of each frame.
-    """
-
-    name: str
-    time: Array
-    positions: Array
-    rotations: Array
-    markers: Array
-    com: Array
-    measured: Array
-    simulated: Array
-    parameters: str
-    residual: Array
-    plates: Array
-    worst: float
-    state: NDArray[np.int8]
-
-
-@dataclass(frozen=True, eq=False)
-class SessionReplay:
-    """The ``trials`` that can be replayed; ``boxes`` (B, 2, 3) m that the body is drawn as, each on the segment
-    ``on`` (B) with its ``sides``; a load that was found: its segment's index and place (3,) m there, else None.
-    """
-
-    trials: tuple[TrialReplay, ...]
-    boxes: Array
-    on: tuple[int, ...]
-    sides: tuple[str, ...]
-    load: tuple[int, Array] | None = None
-
-
-def frames_of(result: SessionResult) -> SessionReplay | None:
-    """Return the replay of a session; None where no trial has a motion."""
-    body, found = result.body, result.identification
-    moving = [
-        (one, one.motion) for one in result.trials if one.motion and one.motion.time.size > 1 and one.trial.markers
-    ]
-    if body is None or not moving:
-        return None
-    validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
-    seconds = sum(motion.time.size / motion.rate for _, motion in moving)
-    rate = min(_FASTEST, _FRAMES / max(seconds, 1e-9))
-    whole, body = body, parts_as_segments(body)
-    parts = shape_parts(body)
-    return SessionReplay(
-        tuple(_trial(whole, body, one, rate, validated) for one, _ in moving),
-        np.reshape([box for _, box in parts], (-1, 2, 3)),
-        tuple(segment for segment, _ in parts),
-        tuple(side_in_name(body.segments[k]) for k, _ in parts),
-        _load_place(body, found.search) if found else None,
-    )
-
-
-def _load_place(body: Body, search: LoadSearch) -> tuple[int, Array] | None:
+def load_place(body: Body, search: LoadSearch) -> tuple[int, Array] | None:
     """Return segment and place (3,) m in it of the load that was found; None without one, or where it is not known."""
     best = search.best if search.found else None
     return (body.segment_index(best.segment), best.place) if best and np.isfinite(best.place).all() else None
-
-
-def _trial(
-    whole: Body, body: Body, one: TrialResult, rate: float, validated: Mapping[str, TrialValidation]
-) -> TrialReplay:
-    """Return one trial of the ``whole`` body, drawn as ``body``, whose parts are segments."""
-    trial, motion = one.trial, one.motion
-    assert motion is not None
-    assert trial.markers is not None
-    simulated, parameters, residual = _simulated(one, validated.get(one.name))
-    size = np.linalg.norm(residual, axis=1)
-    worst, step = int(np.nanargmax(size)) if np.isfinite(size).any() else None, max(1, round(motion.rate / rate))
-    # begin so that every step-th frame meets the worst one
-    chosen = np.arange((worst or 0) % step, motion.time.size, step)
-    shown = motion.at(chosen)
-    pose = poses(body, shown.q)
-    measured = np.full((motion.time.size, 2, 3), np.nan)
-    if trial.plates:
-        measured = np.stack([trial.wrench.force, trial.wrench.cop(height=trial.floor)], axis=1)
-    turn = Rotation.from_matrix(pose.rotation.reshape(-1, 3, 3)).as_quat().reshape(*pose.rotation.shape[:2], 4)
-    return TrialReplay(
-        one.name,
-        shown.time,
-        pose.position,
-        turn,
-        trial.markers.xyz[chosen],
-        centre_of_mass(whole, shown),
-        measured[chosen],
-        simulated[chosen],
-        parameters,
-        residual[chosen],
-        np.reshape([plate.corners for plate in trial.plates], (-1, 4, 3)),
-        float("nan") if worst is None else float(motion.time[worst]),
-        motion.frame_state[chosen],
-    )
-
-
-def _simulated(one: TrialResult, found: TrialValidation | None) -> tuple[Array, str, Array]:
-    """Return the simulation's force and centre of pressure (T, 2, 3), whose parameters, and the residual (T, 3) N."""
-    assert one.motion is not None
-    if found is not None:
-        wrench, about, use, parameters = found.identified.value, found.about, found.use, "identified"
-        left = found.measured.value - wrench
-    elif one.comparison is not None:
-        wrench, about, use, parameters = one.comparison.simulated, np.zeros(3), one.comparison.used, "table"
-        left = one.comparison.measured - wrench
-    else:
-        nothing = np.full((one.motion.time.size, 2, 3), np.nan)
-        return nothing, "table", nothing[:, 0]
-    # the moments are about ``about``: the floor's height and the point found are counted from there
-    cop = zero_moment_point(wrench, height=one.trial.floor - about[2], threshold=20.0) + about
-    return np.stack([wrench[:, :3], cop], axis=1), parameters, np.where(use[:, None], left[:, :3], np.nan)

@@ -16,7 +16,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point
 from biodance.lab.c3d.subject import NO_OUTPUTS, read_outputs
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.markers.signals import MarkerGaps, report_gaps
+from biodance.lab.markers.signals import report_gaps
 from biodance.lab.prepare import prepare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.dynamics import compare, predict_wrench
@@ -58,19 +58,14 @@ def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
     return value
 
 
-def gaps_of(trial: Trial) -> tuple[MarkerGaps, ...]:
-    """Return the gaps of the trial's own marker set, as recorded; of all markers where no set is known."""
-    if trial.markers is None:
-        return ()
-    markers = canonical(trial.markers, read_marker_set(trial.marker_set)) if trial.marker_set else trial.markers
-    return report_gaps(markers)
-
-
 def prepare_trial(trial: Trial) -> TrialResult:
     """Return one trial prepared; a refusal is a step, and the trial stays as it was read."""
     steps: list[Step] = []
-    done = attempt(steps, "prepare", lambda: prepare(trial))
-    return TrialResult(done or trial, tuple(steps), gaps_of(trial), recorded=trial)
+    done, markers = attempt(steps, "prepare", lambda: prepare(trial)), trial.markers
+    if markers is not None and trial.marker_set:  # gaps of other markers concern nobody
+        markers = canonical(markers, read_marker_set(trial.marker_set))
+    gaps = () if markers is None else report_gaps(markers)
+    return TrialResult(done or trial, tuple(steps), gaps, recorded=trial)
 
 
 def filtered_as_it_asks(read: TrialResult, at: Followed | None, before: TrialResult | None = None) -> Trial:
@@ -128,6 +123,7 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         raise TrialRefused(
             f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared."
         )
+    # a posture that the markers leave open is a guess, and so are the accelerations made of it
     chosen = contact.measured & motion.determined
     if not chosen.any():
         raise TrialRefused(
@@ -184,6 +180,7 @@ def examine_trial(
         steps.append(Step("wrench", "refused", none))
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
+        # no body can follow unknown labels, but whoever stands still can be weighed
         everything = np.asarray(np.isfinite(trial.wrench.value).all(axis=1))
         standing = attempt(steps, "standing", lambda: quiet_standing(trial, everything, None, None))
         return TrialResult(trial, tuple(steps), read.gaps, standing=standing)

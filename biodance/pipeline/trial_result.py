@@ -4,7 +4,7 @@ All records are frozen; arrays are in SI units in the lab frame (z up); a wrench
 about the lab origin.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
+from biodance.errors import TrialRefused
 from biodance.identification.statistics import Fit
 from biodance.lab.markers.signals import MarkerGaps
 from biodance.lab.plates.faults import PlateCorrection, correction_doubts
 from biodance.motion.contact import Contact
-from biodance.motion.ik.functional_joints import JointGain
 from biodance.motion.newton import QuietStanding
 from biodance.records import CHANNEL_TITLES, Array, LeftOut, Motion, Trial, Wrench
 
@@ -151,17 +151,21 @@ class ForceGain:
     with_them: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class ShownJoints:
-    """What each optional joint brings to the markers (``gains``), and all that were taken to the ``forces``."""
-
-    gains: tuple[JointGain, ...] = ()
-    forces: tuple[ForceGain, ...] = ()
-
-    @property
-    def taken(self) -> tuple[str, ...]:
-        """Names of the joints that the body has."""
-        return tuple(gain.name for gain in self.gains if gain.taken)
+def forces_told(forces: Sequence[ForceGain]) -> tuple[str, ...]:
+    """Return in one sentence what the joints shown bring to the forces, horizontal and vertical; () without any."""
+    if not forces:
+        return ()
+    # (trials, 3) N RMS by axis; over the axes squares add up, over the trials their mean counts
+    without, with_them = (np.array([getattr(one, name) for one in forces]) for name in ("without", "with_them"))
+    told = []
+    for name, axes in (("horizontal", slice(0, 2)), ("vertical", slice(2, 3))):
+        before, after = (float(np.sqrt(np.mean(np.sum(x[:, axes] ** 2, axis=1)))) for x in (without, with_them))
+        change = 100 * (after / before - 1)
+        word = "does not change" if abs(change) < 1 else f"{'falls' if change < 0 else 'grows'} by {abs(change):.0f} %"
+        told.append(f"that of the {name} force {word} ({before:.1f} to {after:.1f} N)")
+    return (
+        f"Measured and simulated forces chose none of these joints; their RMS difference with them: {', '.join(told)}.",
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +200,13 @@ class TrialResult:
     def name(self) -> str:
         """Name of the trial."""
         return self.trial.name
+
+    @property
+    def moved(self) -> Motion:
+        """The motion. Raises TrialRefused: the trial gives none; the message says why."""
+        if self.motion is None:
+            raise TrialRefused(f"Trial {self.name}: it gives no motion. {self.reason}".strip())
+        return self.motion
 
     @property
     def usable(self) -> bool:

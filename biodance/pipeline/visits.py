@@ -12,15 +12,15 @@ from biodance import display
 from biodance.cycles.curves import CurveGroup, group_curves
 from biodance.cycles.summary import KeyValue, key_values, leading_foot, stride_values
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.identification.knowledge import SIGMAS, Known
-from biodance.identification.sessions import Difference, differences
+from biodance.identification.knowledge import SIGMAS
+from biodance.identification.sessions import differences
 from biodance.lab.session.read import read_session, visit_words
 from biodance.lab.session.recordings import ANOTHER_STATURE
-from biodance.pipeline.attention import corrected_attention, session_attention
+from biodance.pipeline.attention import session_attention
 from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.diagnosis import as_diagnosed, diagnosed_and_corrected
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.movement import SessionMovement, session_movement
+from biodance.pipeline.movement import SessionMovement, describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import followed, identification_of
 from biodance.pipeline.trial_result import Weighing
@@ -145,10 +145,8 @@ def mass_quantities(
     """Return the masses that the first and the last visit have in common, those of segments as
     `biodance.compare_sessions` has them, and why others are not compared.
     """
-    found, notes = [], [one.unweighed for one in (visits[0], visits[-1]) if one.unweighed]
-    weighed = [one.result.weighed for one in visits]
-    if weighed[0] is not None and weighed[-1] is not None:
-        found.append(_whole(weighed, weighed[0], weighed[-1]))
+    found = [*_weights([one.result.weighed for one in visits])]
+    notes = [one.unweighed for one in (visits[0], visits[-1]) if one.unweighed]
     first, last = visits[0].identified, visits[-1].identified
     if first is None or last is None:
         return found, [f"The masses of the segments are not compared: {why}" for why in notes]
@@ -159,32 +157,42 @@ def mass_quantities(
         return found, [f"The masses of the segments are not compared: {why}"]
     known = [one.identified.identification.known if one.identified is not None else () for one in visits]
     masses = [{row.segment: row for row in rows if row.quantity == "mass"} for rows in known]
-    found += [_segment(one, [some.get(one.segment) for some in masses]) for one in changes if one.quantity == "mass"]
+    for one in (change for change in changes if change.quantity == "mass"):
+        side, rows = side_in_name(one.segment), [some.get(one.segment) for some in masses]
+        seen = [(row.value, row.interval) if row else None for row in rows]
+        # a change of which neither visit's data know anything is not tested
+        tested = (one.interval, one.p) if one.known else None
+        found.append(_mass(one.segment.removeprefix(f"{side}_"), side, seen, one.value, tested))
     return found, []
 
 
-def _whole(weighed: Sequence[Weighing | None], first: Weighing, last: Weighing) -> ComparedQuantity:
-    """Return the mass that the plates carry, each visit with its own error."""
+def _weights(weighed: Sequence[Weighing | None]) -> Iterator[ComparedQuantity]:
+    """Yield the mass that the plates carry, where they do in the first and the last visit."""
+    first, last = weighed[0], weighed[-1]
+    if first is None or last is None:
+        return
     # two weighings err independently: variances add; p is two-sided of a normal difference
     change, sd = last.mass - first.mass, float(np.hypot(first.sd, last.sd))
-    return ComparedQuantity(
-        kind=BODY_KIND, quantity="total_mass", key="", side="both", unit="kg",
-        values=tuple(one.mass if one else None for one in weighed),
-        ci95=tuple((one.mass - SIGMAS * one.sd, one.mass + SIGMAS * one.sd) if one else None for one in weighed),
-        counts=(0,) * len(weighed),
-        change=change, change_ci95=(change - SIGMAS * sd, change + SIGMAS * sd), p=float(2 * ndtr(-abs(change) / sd)),
-    )  # fmt: skip
+    seen = [(one.mass, (one.mass - SIGMAS * one.sd, one.mass + SIGMAS * one.sd)) if one else None for one in weighed]
+    interval = (change - SIGMAS * sd, change + SIGMAS * sd)
+    yield _mass("total", "both", seen, change, (interval, float(2 * ndtr(-abs(change) / sd))))
 
 
-def _segment(one: Difference, known: Sequence[Known | None]) -> ComparedQuantity:
-    """Return the mass of one segment; a change of which neither visit's data know anything is not tested."""
-    side = side_in_name(one.segment)
+def _mass(
+    of: str,
+    side: str,
+    seen: Sequence[tuple[float, tuple[float, float]] | None],
+    change: float,
+    tested: tuple[tuple[float, float], float] | None,
+) -> ComparedQuantity:
+    """Return a mass ``of`` the body, ``seen`` in each visit with its interval, and interval and p of its change."""
     return ComparedQuantity(
-        kind=BODY_KIND, quantity=f"{one.segment.removeprefix(f'{side}_')}_mass", key="", side=side, unit="kg",
-        values=tuple(row.value if row else None for row in known),
-        ci95=tuple(row.interval if row else None for row in known),
-        counts=(0,) * len(known), change=one.value, change_ci95=one.interval if one.known else None,
-        p=one.p if one.known else None, why=Untested.NO if one.known else Untested.NOT_KNOWN,
+        kind=BODY_KIND, quantity=f"{of}_mass", key="", side=side, unit="kg",
+        values=tuple(one[0] if one else None for one in seen),
+        ci95=tuple(one[1] if one else None for one in seen),
+        counts=(0,) * len(seen),
+        change=change, change_ci95=tested[0] if tested else None, p=tested[1] if tested else None,
+        why=Untested.NO if tested else Untested.NOT_KNOWN,
     )  # fmt: skip
 
 
@@ -333,12 +341,12 @@ def _examined(session: Session, name: str, tell: Callable[[str], None]) -> Exami
     """Return one visit after all stages, without what its diagnosis proves to be wrong with the plates."""
     tell_visit: Callable[[str], None] = lambda what: tell(f"{name}: {what}")  # noqa: E731
     result, found = diagnosed_and_corrected(followed(session, tell=tell_visit), tell=tell_visit)
-    result = as_diagnosed(result, found.diagnosis) if found else result
-    said = (*found.diagnosis.attention, *corrected_attention(result)) if found else session_attention(result)
+    diagnosis = found.diagnosis if found else None
+    result = as_diagnosed(result, diagnosis) if diagnosis else result
     identified, unweighed = _body_told(result, name)
     date = visit_words(session.folder, [one.name for one in session.trials])["date"]
-    acted = tuple(one for one in said if one.level != "note")
-    return ExaminedVisit(name, date, result, session_movement(result, tell=tell_visit), identified, unweighed, acted)
+    acted = tuple(one for one in session_attention(result, diagnosis) if one.level != "note")
+    return ExaminedVisit(name, date, result, describe_movement(result, tell=tell_visit), identified, unweighed, acted)
 
 
 def _body_told(result: SessionResult, name: str) -> tuple[SessionIdentification | None, str]:
@@ -361,6 +369,7 @@ def _notes(visits: Sequence[ExaminedVisit], found: Sequence[ComparedQuantity]) -
             "no interval and are never told to have changed."
         )
     dates = [one.date for one in visits]
+    # ISO dates in the order of their letters are in the order of time
     if all(dates) and dates != sorted(dates):
         notes.append("The visits are not in the order of their dates; a change is the last one given less the first.")
     if len({one.moved.parameters for one in visits}) > 1:

@@ -106,6 +106,11 @@ class Subject:
     prosthesis: str = ""
     devices: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def declared_mass(self) -> float:
+        """The declared body mass, kg; NaN where nobody declared it."""
+        return float("nan") if "mass" in self.guessed else self.mass
+
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.
 

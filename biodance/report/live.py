@@ -1,25 +1,27 @@
 """A session while it runs: the operator's page, served over the loopback alone, what is printed, the document."""
 
-import json
-import sys
 from collections.abc import Mapping
 from html import escape as escape_html
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Event, Lock, Thread
+from threading import Event, Thread
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
+from starlette.applications import Starlette
+from starlette.background import BackgroundTask
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
 
 from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.display import cause_in_words, spaced
-from biodance.errors import BiodanceError
 from biodance.pipeline.live import LiveResult, LiveState
 from biodance.pipeline.still import asked_posture
 from biodance.report.dance import mannequin_svg
+from biodance.report.loopback import LOOPBACK, loopback_socket, quiet_server
 from biodance.report.pages.template import template_text
 from biodance.report.tables.identification import ASKED
 from biodance.report.tables.schema import Row, Schema
@@ -80,26 +82,13 @@ def print_live(found: LiveResult, document: Row, console: Console) -> None:
     console.print(f"next: {escape(found.state.advice)}")
 
 
-_LOOPBACK = "127.0.0.1"
 _HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
 }
-_PATIENCE = 10.0  # s for which a connection may say nothing
 _LAST = 2.0  # s that the end waits for the page to fetch it
-
-
-class _Server(ThreadingHTTPServer):
-    """Serves the page; says nothing of a browser that went away in the middle of an answer."""
-
-    daemon_threads = True
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Leave the terminal to the stream where a tab was closed; what else goes wrong is told as usual."""
-        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
-            super().handle_error(request, client_address)
 
 
 class LivePage:
@@ -113,19 +102,17 @@ class LivePage:
     """
 
     def __init__(self, port: int = 0) -> None:
-        self._lock, self._fetched, self._watched = Lock(), Event(), False
-        nothing: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
-        self._said = nothing | {"picture": ""}
+        self._fetched, self._watched = Event(), False
+        # never changed, only replaced: the server's thread reads it while the stream goes on
+        self._said: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
+        self._said |= {"picture": ""}
         self._pictures: dict[str, str] = {}
         self.body: Body | None = None
-        try:
-            self._server = _Server((_LOOPBACK, port), self._handler())
-        except (OSError, OverflowError) as error:
-            raise BiodanceError(
-                f"--page {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
-            ) from error
-        self.address = f"http://{_LOOPBACK}:{self._server.server_address[1]}/"
-        Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
+        listener = loopback_socket(port, "--page")
+        self.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
+        self._server = quiet_server(Starlette(routes=[Route("/{path:path}", self._answer)]))
+        self._thread = Thread(target=self._server.run, kwargs={"sockets": [listener]}, daemon=True)
+        self._thread.start()
 
     def show(self, state: LiveState) -> None:
         """Show what is known, suspect and to be done now."""
@@ -143,8 +130,7 @@ class LivePage:
 
     def warn(self, said: LiveWarning) -> None:
         """Add a warning."""
-        with self._lock:
-            self._said["warnings"] = [*self._said["warnings"], Schema("time_s text").row(said)]
+        self._tell(warnings=[*self._said["warnings"], Schema("time_s text").row(said)])
 
     def end(self, state: LiveState, cause: str) -> None:
         """Show the last state, and that the stream has ended, with the ``cause`` where nothing was identified."""
@@ -162,37 +148,19 @@ class LivePage:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Stop serving."""
-        self._server.shutdown()
-        self._server.server_close()
+        self._server.should_exit = True
+        self._thread.join()
 
     def _tell(self, **said: Any) -> None:
-        with self._lock:
-            self._said.update(said)
+        self._said = self._said | said
 
-    def _handler(self) -> type[BaseHTTPRequestHandler]:
-        page = self
-
-        class Handler(BaseHTTPRequestHandler):
-            timeout = _PATIENCE
-
-            def do_GET(self) -> None:
-                asked = self.path if self.headers.get("Host", "").rpartition(":")[0] in (_LOOPBACK, "localhost") else ""
-                code, kind, body = 404, "text/plain", b"There is nothing here."
-                if asked == "/":
-                    code, kind, body = 200, "text/html; charset=utf-8", template_text("live.html").encode()
-                elif asked == "/state.json":
-                    page._watched = True
-                    with page._lock:
-                        code, kind, body = 200, "application/json", json.dumps(page._said).encode()
-                self.send_response(code)
-                for name, value in {"Content-Type": kind, "Content-Length": str(len(body)), **_HEADERS}.items():
-                    self.send_header(name, value)
-                self.end_headers()
-                self.wfile.write(body)
-                if kind == "application/json":
-                    page._fetched.set()
-
-            def log_message(self, *_: Any) -> None:
-                """Say nothing: the terminal belongs to the stream."""
-
-        return Handler
+    def _answer(self, request: Request) -> Response:
+        """Answer with the page or the newest state; who calls us by another host is a stranger (DNS rebinding)."""
+        own = request.headers.get("Host", "").rpartition(":")[0] in (LOOPBACK, "localhost")
+        asked = request.url.path if own else ""
+        if asked == "/":
+            return HTMLResponse(template_text("live.html"), headers=_HEADERS)
+        if asked == "/state.json":
+            self._watched = True
+            return JSONResponse(self._said, headers=_HEADERS, background=BackgroundTask(self._fetched.set))
+        return PlainTextResponse("There is nothing here.", 404, headers=_HEADERS)

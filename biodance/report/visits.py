@@ -21,7 +21,6 @@ from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.tables.diagnosis import ATTENTION_ROW
 from biodance.report.tables.schema import Row, Schema, table_of
-from biodance.report.tables.session import PROVENANCE_ROW
 from biodance.report.terminal import print_line, print_table
 from biodance.report.wording import changed, millimetres, sized_together
 from biodance.uncertainty.visits import FEWEST_STRIDES, placement_sizes
@@ -47,10 +46,7 @@ _VISIT = Schema("session=name date trials=#moved.trials")
 def visits_document(found: VisitComparison) -> Row:
     """Return all that was found: the sentence, every visit, every quantity, and what needs a person."""
     made = now()
-    visits = [
-        _VISIT.row(one) | {"provenance": PROVENANCE_ROW.row(provenance(one.result, created=made))}
-        for one in found.visits
-    ]
+    visits = [_VISIT.row(one) | {"provenance": provenance(one.result, created=made)} for one in found.visits]
     return {
         "text": comparison_sentence(found),
         "visits": visits,

@@ -5,22 +5,23 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body import body_text
-from biodance.diagnosis.diagnosis import Finding
+from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.plates.faults import APPLIED, PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
-from biodance.pipeline.attention import corrected_attention, identified_attention, session_attention
+from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.judged_trials import identified_trials
+from biodance.pipeline.judged_trials import failed_checks, identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement, describe_movement
+from biodance.pipeline.replay import replay_scene
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
-from biodance.pipeline.saved_results import BODY_FILE, SCALED, Provenance, keep_motions, now, provenance
-from biodance.pipeline.still import frames_of
+from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions, now, provenance
+from biodance.pipeline.session import identification_of
+from biodance.pipeline.still import stills_of
 from biodance.records.attention import Attention
 from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
@@ -31,9 +32,8 @@ from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
 from biodance.report.tables.frames import write_session_tables
 from biodance.report.tables.identification import CORRECTED_ROW, identification_document
-from biodance.report.tables.schema import plain_values
+from biodance.report.tables.schema import Row, plain_values
 from biodance.report.tables.session import (
-    PROVENANCE_ROW,
     filter_document,
     gait_document,
     movement_document,
@@ -52,47 +52,47 @@ def write_session(
     lab: Path | None = None,
     for_subject: str | None = None,
     drawn: bool = True,
-    tell: Callable[[str], None],
+    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[SessionResult, dict[str, Any]]:
-    """Write what was found in a session, its ``tables``, and a page ``for_subject`` in that language."""
+    """Write ``results.json``, ``methods.md`` and, where ``drawn``, ``report.html`` of a session with its diagnosis,
+    ``tables``, and a page ``for_subject`` in that language; return the session as it is told, and the numbers.
+    """
     diagnosis = found.diagnosis if found else None
     result = as_diagnosed(result, diagnosis) if diagnosis else result
-    moved = describe_movement(result, lab=lab, tell=tell)
+    moved = _described(result, diagnosis, tables, lab, tell)
     tell("writing the page" if drawn else "writing")
-    write_session_tables(tables, result, diagnosis, movement=moved)
     if for_subject:
         write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, found, moved), for_subject)})
-    return result, write_report(result, folder, diagnosis=found, movement=moved, drawn=drawn)
-
-
-def write_report(
-    result: SessionResult,
-    folder: Path,
-    *,
-    diagnosis: SessionDiagnosis | None = None,
-    movement: SessionMovement | None = None,
-    drawn: bool = True,
-) -> dict[str, Any]:
-    """Write ``report.html`` (where ``drawn``), ``methods.md``, ``results.json``; return the latter's content."""
-    made = provenance(result, created=now())
-    first = (*diagnosis.diagnosis.attention, *corrected_attention(result)) if diagnosis else session_attention(result)
-    judged = diagnosis.diagnosis.judged if diagnosis else ()
+    made, first = provenance(result, created=now()), session_attention(result, diagnosis)
     numbers = {
         **results_document(result, made),
-        "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
+        "diagnosis": diagnosis_document(found) if found else None,
         "attention": ATTENTION_ROW.rows(first),
-        "judged": JUDGED_ROW.rows(judged),
-        "movement": movement_document(movement),
-        "gait": gait_document(movement),
+        "judged": JUDGED_ROW.rows(diagnosis.judged if diagnosis else ()),
+        **_moved(result, moved),
     }
-    found: dict[str, Any] = plain_values(numbers)
-    files = {METHODS: methods_text(found)}
+    # the paragraph on methods says what stands in results.json, so both are made of the same values
+    told: dict[str, Any] = plain_values(numbers)
+    files = {METHODS: methods_text(told)}
     if drawn:
-        files |= {PAGE: _page(result, made, first, diagnosis, movement)} | _kept(result, folder)
-    return write_results(folder, found, files)
+        files |= {PAGE: _page(result, made, first, found, moved)} | _kept(result, folder)
+    return result, write_results(folder, told, files)
 
 
-def _moved(result: SessionResult, movement: SessionMovement | None) -> dict[str, Any]:
+def _described(
+    result: SessionResult,
+    diagnosis: Diagnosis | None,
+    tables: Path | None,
+    lab: Path | None,
+    tell: Callable[[str], None],
+) -> SessionMovement:
+    """Write the ``tables`` of a session, where they are wanted, and return what moved in it."""
+    moved = describe_movement(result, lab=lab, tell=tell)
+    write_session_tables(tables, result, diagnosis, movement=moved)
+    return moved
+
+
+def _moved(result: SessionResult, movement: SessionMovement) -> dict[str, Any]:
     return {
         "filter": filter_document(result),
         "movement": movement_document(movement),
@@ -103,6 +103,7 @@ def _moved(result: SessionResult, movement: SessionMovement | None) -> dict[str,
 def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
     """Write the motions; return the body that belongs to them, for `export`. After a failed fit there is none."""
     fit = result.identification
+    # the motions are of the body beside them: without one that is believed neither is of use to `export`
     if result.body is None or (fit is not None and fit.status != "solved"):
         return {}
     keep_motions(result, folder)
@@ -111,30 +112,33 @@ def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
 
 def write_identification(
     result: SessionResult,
-    found: SessionIdentification,
     folder: Path,
     *,
-    checks: tuple[QualityCheck, ...] = (),
-    movement: SessionMovement | None = None,
+    tables: Path | None = None,
+    lab: Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;
-    return the numbers. ``checks`` of the recordings that failed are said first.
+    """Write ``report.html``, ``results.json`` with the identification alone, ``body.json``, the identified body, and
+    ``tables``; return the numbers. Checks of the recordings that failed are said first.
 
     After a failed fit there is no ``body.json``.
     """
-    made = provenance(result, created=now())
-    first = identified_attention(result, checks)
+    found = identification_of(result)
+    tell("checking units, signs, labels and clocks")
+    made, first = provenance(result, created=now()), identified_attention(result, failed_checks(result))
+    moved = _described(result, None, tables, lab, tell)
+    tell("writing the page")
     numbers = {
         "session": result.session.folder.name,
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(identified_trials(result)),
         **identification_document(found),
         "corrected": CORRECTED_ROW.rows(found.corrected),
-        **_moved(result, movement),
-        "provenance": PROVENANCE_ROW.row(made),
+        **_moved(result, moved),
+        "provenance": made,
     }
     told: dict[str, Any] = plain_values(numbers)
-    page = _page(result, made, first, movement=movement)
+    page = _page(result, made, first, None, moved)
     return write_results(folder, told, {METHODS: methods_text(told), PAGE: page} | _kept(result, folder))
 
 
@@ -145,20 +149,24 @@ def write_diagnosis(
     *,
     accepted: bool,
     earlier: tuple[PlateCorrection, ...] = (),
-    movement: SessionMovement | None = None,
+    tables: Path | None = None,
+    lab: Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` of a diagnosis, and return the numbers.
+    """Write ``report.html``, ``results.json`` and ``tables`` of a diagnosis, and return the numbers.
 
     With ``accepted`` also what follows from the findings that are proven to gain: ``body.json``, ``lab.toml`` (with the
     corrections made ``earlier``), the trials corrected, and copies of recordings with their labels put right.
     """
-    made = provenance(result, created=now())
+    result = as_diagnosed(found.judged or result, found.diagnosis)
+    moved, made = _described(result, found.diagnosis, tables, lab, tell), provenance(result, created=now())
+    tell("writing the page")
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
-        **_moved(result, movement),
+        **_moved(result, moved),
         "failures": {**result.failures, **found.failures},
-        "provenance": PROVENANCE_ROW.row(made),
+        "provenance": made,
     }
     files = {PAGE: diagnosis_page(result, found, made)}
     if accepted:
@@ -244,10 +252,12 @@ def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[s
 
 def _page(
     result: SessionResult,
-    made: Provenance,
+    made: Row,
     attention: tuple[Attention, ...],
-    diagnosis: SessionDiagnosis | None = None,
-    movement: SessionMovement | None = None,
+    found: SessionDiagnosis | None,
+    moved: SessionMovement,
 ) -> str:
-    told, moved = diagnosis_section(diagnosis) if diagnosis else "", movement_section(movement) if movement else ""
-    return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames_of(result))
+    return page(
+        result, made, attention=attention, diagnosis=diagnosis_section(found) if found else "",
+        movement=movement_section(moved), replay=replay_scene(result), stills=stills_of(result),
+    )  # fmt: skip

@@ -10,6 +10,7 @@ from biodance.body.solids import ROUNDNESS
 from biodance.display import BLACK, GREEN, GREY, YELLOW
 from biodance.identification.validation import TrialValidation
 from biodance.motion.newton import QuietStanding
+from biodance.pipeline.replay import FORCE_SCALE, RESIDUAL_SCALE
 from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures import vector as svg
@@ -144,12 +145,6 @@ def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None 
     cells = _channels(curves, one.measured.value, one.use)
     return svg.CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
 
-
-FORCE_SCALE = 0.001
-"""Length of the drawn force, m per N."""
-
-RESIDUAL_SCALE = 0.01
-"""Length of the drawn residual force, m per N: ten times the measured force's."""
 
 VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 """Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""

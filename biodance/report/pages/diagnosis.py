@@ -12,7 +12,7 @@ from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
-from biodance.pipeline.saved_results import Provenance, now
+from biodance.pipeline.saved_results import now
 from biodance.pipeline.words import first_upper
 from biodance.records import CHANNEL_TITLES, CHANNELS, grouped
 from biodance.report import wording
@@ -146,7 +146,7 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
     return render("wrong.html.j2", failures=found.failures, rows=rows)
 
 
-def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
+def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Row) -> str:
     """Return the page as HTML text; the same arguments give the same characters."""
     from markupsafe import Markup
 
@@ -169,7 +169,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
             "spaced": spaced,
         },
         scripts=[template_text("curves.js")],
-        sheet=print_sheet(f"Session {result.session.folder.name}", provenance.visit, provenance.created),
+        sheet=print_sheet(f"Session {result.session.folder.name}", provenance["visit"], provenance["created_utc"]),
         named=cause_in_words,
         schemas={
             "limit": LIMIT_ROW,

@@ -60,7 +60,7 @@ _PROFILE = Schema("", shown="score: {value} | right: {right} | left: {left}")
 
 def movement_section(moved: SessionMovement) -> str:
     """Return the section as HTML text; "" where no trial holds a repetition and none has another program's angles."""
-    parts = [_part(one, moved.normal) for one in moved.repetitions.values() if one.good]
+    parts = [_part(one, moved.healthy.normal) for one in moved.repetitions.values() if one.good]
     compared = [one for one in moved if one.file_angles]
     if not parts and not compared:
         return ""

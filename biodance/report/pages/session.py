@@ -6,7 +6,7 @@ folded, everything by trial.
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import unescape
 from typing import Any
@@ -16,14 +16,10 @@ import numpy as np
 from biodance.identification.validation import TrialValidation
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import Provenance
-from biodance.pipeline.still import SessionReplay, TrialReplay
-from biodance.pipeline.trial_result import Check, TrialResult
+from biodance.pipeline.trial_result import Check, Still, TrialResult
 from biodance.records import CHANNELS, AngleState, Array
 from biodance.records.attention import Attention
 from biodance.report.figures.session import (
-    FORCE_SCALE,
-    RESIDUAL_SCALE,
     marker_figure,
     standing_figure,
     still_figure,
@@ -31,61 +27,17 @@ from biodance.report.figures.session import (
     wrench_figure,
 )
 from biodance.report.pages.identification import identification_section
-from biodance.report.pages.template import packed_numbers, print_sheet, render, script_json, template_text, three_js
-from biodance.report.tables.schema import Row, Schema
+from biodance.report.pages.template import print_sheet, render, script_json, template_text, three_js
+from biodance.report.tables.schema import Row
 from biodance.report.tables.session import GAP_ROW
 from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres
-
-
-def replay_data(found: SessionReplay) -> str:
-    """Return what ``replay.js`` draws as JSON that may stand in a page.
-
-    ``boxes`` with ``low`` and ``high`` m in the segment ``on``, ``side``; ``load`` segment and place or null; scales of
-    the arrows m per N; ``trials`` with ``name``, ``frames``, ``start_s``, ``step_s``, ``worst_s``, ``origin`` m and
-    ``unit`` m of a step, and int16 arrays, little-endian in base64, frame by frame: ``places`` of segments, markers,
-    centre of mass and the two centres of pressure, ``turns`` (x y z w in 1/32767), ``forces`` measured, simulated and
-    left in 0.1 N; ``state`` one digit a frame, `AngleState`.
-    """
-    boxes = zip(found.boxes.round(4), found.on, found.sides, strict=True)
-    scene = {
-        "boxes": [{"on": on, "side": side, "low": low, "high": high} for (low, high), on, side in boxes],
-        "load": None if found.load is None else {"on": found.load[0], "place": found.load[1].round(4)},
-        "force_scale": FORCE_SCALE,
-        "residual_scale": RESIDUAL_SCALE,
-        "trials": [_trial(one) for one in found.trials],
-    }
-    return script_json(scene)
-
-
-def _trial(one: TrialReplay) -> dict[str, Any]:
-    places = np.concatenate(
-        [one.positions, one.markers, one.com[:, None], one.measured[:, 1:], one.simulated[:, 1:]], axis=1
-    )
-    origin = np.nanmean(one.com, axis=0)
-    # whole numbers of 16 bits: the segment furthest from the origin is at most 30,000 steps away
-    unit = max(1e-4, float(np.nanmax(np.abs(one.positions - origin))) / 30000)
-    forces = np.stack([one.measured[:, 0], one.simulated[:, 0], one.residual], axis=1)
-    return {
-        **Schema("name parameters frames=#time worst_s=worst").row(one),
-        "segments": one.positions.shape[1],
-        "markers": one.markers.shape[1],
-        "start_s": float(one.time[0]),
-        "step_s": float(one.time[-1] - one.time[0]) / max(one.time.size - 1, 1),
-        "plates": one.plates.round(4),
-        "origin": origin.round(4),
-        "unit": unit,
-        "places": packed_numbers((places - origin.round(4)) / unit),
-        "turns": packed_numbers(32767 * one.rotations),
-        "forces": packed_numbers(10 * forces),
-        "state": "".join(str(int(one)) for one in one.state),
-    }
-
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
 
 def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[TrialResult, list[Check | None]]]]:
     """Return the trials' checks as a table: its columns (what, limit), and per trial one check or None a column."""
+    # the limit of forces grows with the movement of a trial: each limit has a column of its own
     columns = list(dict.fromkeys((check.what, check.limit) for trial in result.trials for check in trial.checks))
     rows = []
     for trial in result.trials:
@@ -108,7 +60,7 @@ def key_figures(result: SessionResult) -> list[Tile]:
     """Return the mass and the key figures of a session: markers, forces, and what the movement told of the body."""
     tiles = []
     if result.weighed:
-        declared = result.declared_mass
+        declared = result.subject.declared_mass
         beside = f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
         beside = beside if np.isfinite(declared) else "none declared"
         outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)
@@ -129,48 +81,35 @@ def key_figures(result: SessionResult) -> list[Tile]:
     return tiles
 
 
-@dataclass(frozen=True)
-class TrialPart:
-    """One trial with its figures as HTML; "" where there is nothing to draw."""
-
-    result: TrialResult
-    markers: str
-    wrench: str
-    validation: TrialValidation | None = None
-
-    @property
-    def gaps(self) -> list[Row]:
-        """The markers with a gap, the worst first."""
-        return GAP_ROW.rows(sorted((gap for gap in self.result.gaps if gap.percent > 0), key=lambda gap: -gap.percent))
-
-    @property
-    def said(self) -> list[str]:
-        """What was decided when the trial was read and prepared, each sentence once."""
-        trial = self.result.trial
-        lines = ((plate.name, line) for plate in trial.plates for line in plate.decisions)
+def _trial_part(result: TrialResult, validated: TrialValidation | None) -> dict[str, Any]:
+    """Return one trial as the page shows it: its figures as HTML ("" where there is nothing to draw), its ``gaps``, the
+    worst first, what was ``said`` when it was read and prepared, and the comparison of the wrenches by ``channels``.
+    """
+    trial, compared, motion = result.trial, result.comparison, result.motion
+    filled, wrench = None if motion is None else motion.frame_state == AngleState.FILLED, ""
+    if validated is not None:
+        wrench = validation_figure(validated, filled=filled)
+    elif compared is not None:
+        wrench = wrench_figure(compared, trial.name, filled=filled)
+    lines = ((plate.name, line) for plate in trial.plates for line in plate.decisions)
+    channels: list[tuple[str, str, float, float]] = []
+    if compared is not None:
+        # who stands still presses evenly: there is nothing to correlate but noise
+        alike = [math.nan] * 6 if trial.role == "static" else compared.correlation.tolist()
+        channels = list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, compared.rms.tolist(), alike, strict=True))
+    return {
+        "result": result,
+        "markers": marker_figure(result.fit) if result.fit else "",
+        "wrench": wrench,
+        "validation": validated,
+        "gaps": GAP_ROW.rows(sorted((gap for gap in result.gaps if gap.percent > 0), key=lambda gap: -gap.percent)),
         # a reader's history repeats some of what it decided on plates
-        told = [f"{name}: {line}" for name, line in lines if not any(line in said for said in trial.history)]
-        return [*trial.history, *told]
-
-    @property
-    def channels(self) -> list[tuple[str, str, float, float]]:
-        """Channel, unit, RMS and correlation of the wrench comparison; no correlation where nobody moves."""
-        comparison = self.result.comparison
-        if comparison is None:
-            return []
-        units = ("N",) * 3 + ("N·m",) * 3
-        alike = [math.nan] * 6 if self.result.trial.role == "static" else comparison.correlation.tolist()
-        return list(zip(CHANNELS, units, comparison.rms.tolist(), alike, strict=True))
-
-
-def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -> TrialPart:
-    name = result.trial.name
-    filled = None if result.motion is None else result.motion.frame_state == AngleState.FILLED
-    if name in validated:
-        wrench = validation_figure(validated[name], filled=filled)
-    else:
-        wrench = wrench_figure(result.comparison, name, filled=filled) if result.comparison else ""
-    return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
+        "said": [
+            *trial.history,
+            *(f"{name}: {line}" for name, line in lines if not any(line in said for said in trial.history)),
+        ],
+        "channels": channels,
+    }
 
 
 def _place(about: Array) -> str:
@@ -205,16 +144,17 @@ def _fold(found: re.Match[str]) -> str:
 
 def page(
     result: SessionResult,
-    provenance: Provenance,
+    provenance: Row,
     *,
     attention: Sequence[Attention] | None = None,
     diagnosis: str = "",
     movement: str = "",
-    replay: SessionReplay | None = None,
+    replay: dict[str, Any] | None = None,
+    stills: Sequence[Still] = (),
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
     `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
-    moved, "" for none; ``replay`` its frames in 3-D.
+    moved, "" for none; ``replay`` its frames in 3-D (`replay_scene`), ``stills`` some of them drawn (`stills_of`).
 
     The same arguments give the same characters.
     """
@@ -225,16 +165,14 @@ def page(
     found = result.identification
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
     identified = identification_section(found) if found else ""
-    worst = result.more_stills[0] if result.more_stills else result.still
-    others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
     whole = render(
         "page.html.j2",
         filters={"place": _place, "apart": _apart},
         schemas={"gap": GAP_ROW},
         scripts=[template_text("curves.js"), *((three_js(), template_text("replay.js")) if replay else ())],
-        replay=Markup(replay_data(replay)) if replay else "",
-        loaded=bool(replay and replay.load),
-        sheet=print_sheet(f"Session {result.session.folder.name}", provenance.visit, provenance.created),
+        replay=Markup(script_json(replay)) if replay else "",
+        loaded=bool(replay and replay["load"]),
+        sheet=print_sheet(f"Session {result.session.folder.name}", provenance["visit"], provenance["created_utc"]),
         headline=headline_of(said),
         attention=loud,
         noted=noted,
@@ -243,11 +181,11 @@ def page(
         check_table=check_table(result),
         result=result,
         provenance=provenance,
-        parts=[_trial_part(trial, validated) for trial in result.trials],
+        parts=[_trial_part(trial, validated.get(trial.name)) for trial in result.trials],
         standing=Markup(standing_figure(result.standing)) if result.standing else "",
-        shown=Markup(still_figure(worst)) if worst else "",
-        shown_still=worst,
-        more_stills=[(Markup(still_figure(one)), one) for one in others],
+        shown=Markup(still_figure(stills[0])) if stills else "",
+        shown_still=stills[0] if stills else None,
+        more_stills=[(Markup(still_figure(one)), one) for one in stills[1:]],
         diagnosis=Markup(diagnosis),
         movement=Markup(movement),
         identification=Markup(identified),

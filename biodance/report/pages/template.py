@@ -14,10 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from biodance.errors import BiodanceError
-from biodance.records import Array
 from biodance.report.tables.schema import Row, Schema, plain_values
 from biodance.report.wording import format_number, millimetres, moment
 from biodance.version import __version__
@@ -54,16 +51,6 @@ def three_js() -> str:
 def script_json(document: object) -> str:
     """Return a document as JSON that may stand in a ``<script>`` of a page: no text in it can end or open one."""
     return json.dumps(plain_values(document), separators=(",", ":")).replace("<", "\\u003c")
-
-
-def packed_numbers(values: Array) -> str:
-    """Return values as whole numbers of 16 bits in base64; what is not known or beyond them as -32768."""
-    known = np.isfinite(values) & (np.abs(values) < -_UNKNOWN - 0.5)
-    whole = np.where(known, np.rint(np.where(known, values, 0.0)), _UNKNOWN).astype("<i2")
-    return b64encode(whole.tobytes()).decode("ascii")
-
-
-_UNKNOWN = -32768  # Whole number of a place that is not known
 
 
 def template_text(name: str) -> str:

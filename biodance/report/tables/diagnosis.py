@@ -51,6 +51,13 @@ def causes_shown(rows: Iterable[Row]) -> list[Row]:
 
 ATTENTION_ROW = Schema("level text trial about")
 """What a person must see, strongest first."""
+
+
+def asks_nobody(attention: Iterable[Row]) -> bool:
+    """Return whether nobody has to do anything about what must be seen: all of it are notes."""
+    return all(row["level"] == "note" for row in attention)
+
+
 JUDGED_ROW = Schema(
     "trial seconds left_out_s missed",
     {"why_not": lambda one: one.why_not or None, "left_out": lambda one: dict(one.left_out)},

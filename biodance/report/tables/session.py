@@ -4,13 +4,10 @@ import numpy as np
 
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.movement import TrialMovement
 from biodance.cycles.scores import GaitScores
-from biodance.cycles.strides import STRIDE_UNITS
 from biodance.lab.prepare import force_filter, motion_filter
-from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.movement import SessionMovement, spatiotemporal_rows
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import Provenance
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, SIDES
 from biodance.report.tables.identification import (
@@ -153,19 +150,17 @@ _SESSION = Schema(
         "trials": lambda one: [_trial(trial, one) for trial in one.trials],
         "steps": STEP_ROW,
         "body": Schema(
-            "source=body_source notes=body.notes",
+            "source=placed.source notes=body.notes",
             {
-                "optional_joints": _JOINT.at("shown_joints.gains"),
-                "optional_joints_force": Schema("trial rms_without_N=without rms_with_N=with_them").at(
-                    "shown_joints.forces"
-                ),
+                "optional_joints": _JOINT.at("placed.gains"),
+                "optional_joints_force": Schema("trial rms_without_N=without rms_with_N=with_them").at("joint_forces"),
             },
         ).row,
         "checks": CHECK_ROW.at("all_checks"),
         "filter": filter_document,
         "mass_check": Schema(
             "trial=weighed.trials.0 mass_on_plates_kg=weighed.mass mass_on_plates_sd_kg=weighed.sd "
-            "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=declared_mass "
+            "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=subject.declared_mass "
             "difference_percent=mass_difference"
         ).row,
         "identification": lambda one: one.identification and identification_document(one.identification),
@@ -174,8 +169,6 @@ _SESSION = Schema(
         "diagnosis": lambda _: None,
     },
 )
-PROVENANCE_ROW = Schema("created_utc=created commit versions blas inputs_sha256=inputs settings visit")
-"""Which software made a result, from which files, with which settings."""
 
 
 def _trial(one: TrialResult, result: SessionResult) -> Row:
@@ -185,18 +178,9 @@ def _trial(one: TrialResult, result: SessionResult) -> Row:
     return row
 
 
-def results_document(result: SessionResult, provenance: Provenance) -> Row:
+def results_document(result: SessionResult, provenance: Row) -> Row:
     """Return all of ``result``; null where a step was refused or does not exist in this version."""
-    return {**_SESSION.row(result), "provenance": PROVENANCE_ROW.row(provenance)}
-
-
-def _spatiotemporal(one: TrialMovement) -> list[Row]:
-    keys = ("quantity", "unit", "side", "mean", "sd", "count")
-    return [
-        dict(zip(keys, (name, STRIDE_UNITS[name], side, *values), strict=True))
-        for side in ("both", "left", "right")
-        for name, values in one.spatiotemporal(side).items()
-    ]
+    return {**_SESSION.row(result), "provenance": provenance}
 
 
 def _curve(group: CurveGroup) -> Row:
@@ -229,7 +213,7 @@ _MOVED = Schema(
         "events": EVENT_ROW,
         "markers_after_forces_s": lambda one: dict(zip(("strikes", "leavings"), one.late, strict=True)),
         "cycles": Schema("kind side start_s=start end_s=end off_s=off"),
-        "spatiotemporal": _spatiotemporal,
+        "spatiotemporal": spatiotemporal_rows,
         "curves": lambda one: [_curve(group) for group in one.groups],
         "file_angles": FILE_ANGLE_ROW,
         "file_events": Schema("down late_s=late sd_s=sd count missed"),
