@@ -145,19 +145,20 @@ def file_curves(
     person goes. Where the pelvis of ``ours``, the curves of the same cycle, is turned otherwise by more than
     `_OBLIQUE` on average, they are no curves of the same thing and are left out.
     """
+    named = {name: (outputs.angles.get(f"{cycle.side[:1].upper()}{of}"), k) for name, (of, k) in _PLUG_IN_GAIT.items()}
+    told = {name: some[:, k] for name, (some, k) in named.items() if some is not None and len(some) == time.size}
+    yield from _beside(cycle, told, time, ours)
+
+
+def _beside(
+    cycle: cut.Cycle, angles: Mapping[str, Array], time: Array, ours: Sequence[CycleCurve]
+) -> Iterator[CycleCurve]:
+    """Yield ``angles`` (T,) deg by quantity over a gait cycle, as far as they are of the same thing as ``ours``."""
     if cycle.kind != "gait":
         return
-    found = []
-    for quantity, (label, axis) in _PLUG_IN_GAIT.items():
-        theirs = outputs.angles.get(f"{cycle.side[:1].upper()}{label}")
-        if theirs is not None and len(theirs) == time.size:
-            # Wrapped to [-180, 180).
-            found.append(over_cycle(cycle, quantity, cycle.side, "deg", time, (theirs[:, axis] + 180) % 360 - 180))
-    yield from _told_alike(found, ours)
-
-
-def _told_alike(theirs: Sequence[CycleCurve], ours: Sequence[CycleCurve]) -> Iterator[CycleCurve]:
-    """Yield the curves of a cycle that are curves of the same thing as ``ours`` (`file_curves`)."""
+    # Wrapped to [-180, 180).
+    wrapped = {name: (angle + 180) % 360 - 180 for name, angle in angles.items()}
+    theirs = [over_cycle(cycle, name, cycle.side, "deg", time, angle) for name, angle in wrapped.items()]
     # Mean over the cycle of theirs less ours.
     turned = [[one.value for one in some if one.quantity == "pelvis_rotation"] for some in (ours, theirs)]
     oblique = not all(turned) or not abs(np.nanmean(turned[1][0] - turned[0][0])) < _OBLIQUE
@@ -179,8 +180,7 @@ def conventional_curves(
     way = direction_of(cycle, poses(body, motion.q[part]), time)
     axis = int(np.argmax(np.abs(way)))
     angles = conventional.angles(cycle.side, np.sign(way[axis]) * np.eye(2)[axis], part)
-    found = [over_cycle(cycle, name, cycle.side, "deg", time, value) for name, value in angles.items()]
-    yield from _told_alike(found, ours)
+    yield from _beside(cycle, angles, time, ours)
 
 
 _WORDS = {
