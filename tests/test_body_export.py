@@ -10,9 +10,8 @@ import pytest
 from random_bodies import random_body, random_motion
 from scipy.spatial.transform import Rotation
 
-from biodance.body.export import formats, write_model
+from biodance.body.export import euler_angles, formats, write_model
 from biodance.body.export.csv import STANDARD
-from biodance.body.export.urdf import roll_pitch_yaw
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError, FileRefused, UnknownName
@@ -241,4 +240,6 @@ def test_angles_of_a_rotation_are_exact_in_the_singular_posture_too() -> None:
     rng = np.random.default_rng(5)
     turns = [*Rotation.random(20, rng=rng).as_matrix(), Rotation.from_euler("y", 90, degrees=True).as_matrix(), UPRIGHT]
     for R in turns:
-        assert Rotation.from_euler("xyz", roll_pitch_yaw(R)).as_matrix() == pytest.approx(R, abs=1e-12)
+        for order in ("xyz", "XYZ"):
+            angles = euler_angles(order, R)
+            assert Rotation.from_euler(order, angles).as_matrix() == pytest.approx(R, abs=1e-12)

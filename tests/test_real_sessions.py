@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from biodance.cycles.scores import gait_scores, gait_vectors, normal_curves
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.judged_trials import failed_checks
@@ -142,6 +143,46 @@ def test_knee_and_hip_of_five_real_walks_are_within_two_degrees_of_plug_in_gait(
     assert {one.because.value for one in moved.gait.left_out} == {"shared_plate"}
     loads = next(one for one in moved.gait.groups if (one.quantity, one.side) == ("hip_flexion_moment", "right"))
     assert np.nanmax(np.abs(loads.values)) < 2.0  # N·m/kg: no spikes from the shares of a plate under both feet
+
+
+WALKERS = (*(f"biomechzoo/{child}" for child in (*CHILDREN, "HC002D", "HC030A", "HC036A")), "c3d_parser_MH", "pycgm")
+
+
+@pytest.mark.parametrize("name", WALKERS)
+def test_plug_in_gait_computed_here_is_that_of_the_file(name: str, recording: Recording) -> None:
+    gait = describe_movement(recording(name)).gait
+    assert gait is not None
+    keys = [one for one in gait.keys if one.quantity in ("hip_flexion", "hip_adduction", "knee_flexion")]
+    assert len(keys) == 15
+    for one in keys:
+        for side, theirs in one.beside.items():
+            assert abs(one.conventional[side].mean - theirs.mean) < 0.5, (one.name, side)
+
+
+def test_profile_scores_of_plug_in_gait_computed_here_and_in_the_files_are_the_same(recording: Recording) -> None:
+    gaits = {name: describe_movement(recording(name)).gait for name in WALKERS}
+    for name in ("biomechzoo/HC002D", "biomechzoo/HC031A", "biomechzoo/HC036A", "c3d_parser_MH"):
+        others = {one: gait.file_groups for one, gait in gaits.items() if gait is not None and one != name}
+        normal, walked = normal_curves(others), gaits[name]
+        assert walked is not None
+        seen = gait_vectors(walked.file_curves)
+        here = gait_scores([one for one in walked.conventional_curves if one.cycle in seen], normal)
+        theirs = gait_scores(walked.file_curves, normal)
+        assert here is not None
+        assert theirs is not None
+        assert here.overall == pytest.approx(theirs.overall, abs=0.2)
+
+
+def test_axes_that_a_laboratory_corrected_by_hand_are_seen_beside_the_static_trial(recording: Recording) -> None:
+    """Sydney's static holds thigh rotations of -1.0 and -1.1 degrees, its walks of 2.6 and 2.0: made with others."""
+    hips = {
+        (one.joint, walk.trial): one.conventional
+        for walk in describe_movement(recording("c3d_parser_Sydney"))
+        for one in walk.file_angles
+        if one.joint.endswith("hip_rotation") and walk.cycles
+    }
+    assert len(hips) == 10
+    assert all(4.0 < rms < 6.5 for rms in hips.values())
 
 
 @pytest.mark.parametrize("child", ["HC050A", "HC055A"])

@@ -382,15 +382,8 @@ def smallest_eigenvalues(phi: Array) -> Array:
 
 
 def turn_inertia(lump: RigidInertia, rotation: Array) -> RigidInertia:
-    """Return the lump in another frame with the same origin: ``rotation`` (3, 3) is new_R_old."""
+    """Return the lump in another frame with the same origin: ``rotation`` (3, 3) is new_R_old, or a reflection."""
     return RigidInertia(lump.mass, rotation @ lump.com, rotation @ lump.inertia @ rotation.T)
-
-
-def mirror_inertia(lump: RigidInertia) -> RigidInertia:
-    """Return the lump of the other body side: reflected at the plane z = 0."""
-    flip = np.diag([1.0, 1.0, -1.0])
-    # Quadratic in the places, so F I F holds for a reflection, too.
-    return RigidInertia(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
 
 
 def parameter_jacobian(lump: RigidInertia) -> Array:

@@ -115,7 +115,10 @@ def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
     from scipy.spatial import ConvexHull, QhullError
 
     if not hulls:
-        normals = np.concatenate([_normals(corners) for corners in boxes])
+        # Outward normals of each box, along its edges and against them; its corners are ordered as in `_shapes`.
+        edges = np.concatenate([corners[[4, 2, 1]] - corners[0] for corners in boxes])
+        edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+        normals = np.stack([edges.reshape(-1, 3, 3), -edges.reshape(-1, 3, 3)], axis=1).reshape(-1, 3)
         return np.asarray(normals[np.argmax(-normals @ up)])
     points = np.concatenate([*boxes, *hulls])
     try:
@@ -132,13 +135,6 @@ def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
     # Mean normal, weighted with the areas.
     mean = (alike[best] * area) @ normals
     return np.asarray(mean / np.linalg.norm(mean)) if face[best] > 0 else np.asarray(normals[np.argmax(-normals @ up)])
-
-
-def _normals(corners: Array) -> Array:
-    """Return the outward normals (6, 3) of a box from its corners (8, 3), ordered as `urdf_file` does."""
-    axes = np.array([corners[4] - corners[0], corners[2] - corners[0], corners[1] - corners[0]])
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    return np.concatenate([axes, -axes])
 
 
 def _largest(flat: Array, outline: list[int]) -> list[int]:

@@ -11,11 +11,13 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.body.human.conventional import ConventionalTrial
 from biodance.cycles import cut
 from biodance.cycles.curves import (
     CurveGroup,
     CycleCurve,
     angle_curves,
+    direction_of,
     ground_curves,
     group_curves,
     lab_curves,
@@ -26,9 +28,9 @@ from biodance.cycles.strides import Stride, lift, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
-from biodance.motion.kinematics import centre_of_mass
+from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, FootEvent, Mask, Motion, Sip, Trial
+from biodance.records import SIDES, Array, FootEvent, Mask, Motion, Sip, Trial
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -55,12 +57,14 @@ _AGAINST_LAB = ("PelvisAngles", "FootProgressAngles")
 _OBLIQUE = 6.0  # deg
 _NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
 _FEWEST = 20  # Frames without which nothing is compared
+_X = np.array([1.0, 0.0])
 
 
 @dataclass(frozen=True)
 class AngleComparison:
     """One joint angle beside that of the file: ``offset`` deg the mean of ours less the file's, ``sd`` deg of the
-    difference about it, ``correlation`` (NaN where one does not move), over ``frames``.
+    difference about it, ``correlation`` (NaN where one does not move), over ``frames``; ``conventional`` deg the RMS
+    difference of the conventional gait model, computed here from the same markers, to the file's (NaN without one).
     """
 
     joint: str
@@ -69,6 +73,7 @@ class AngleComparison:
     sd: float
     correlation: float
     frames: int
+    conventional: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -92,9 +97,11 @@ def emg_curves(cycle: cut.Cycle, outputs: FileOutputs) -> Iterator[CycleCurve]:
             yield over_cycle(cycle, f"{one.muscle}{EMG}", one.side, one.unit, one.time, one.value)
 
 
-def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:
+def compare_angles(
+    body: Body, motion: Motion, outputs: FileOutputs, conventional: ConventionalTrial | None = None
+) -> tuple[AngleComparison, ...]:
     """Return every angle that both have, over the frames in which both are known."""
-    comparisons = []
+    comparisons, here = [], {side: conventional.angles(side, _X) for side in SIDES} if conventional else {}
     for j, joint in enumerate(body.joints):
         side, _, name = joint.name.partition("_")
         label, axis = _PLUG_IN_GAIT.get(name, ("", 0))
@@ -110,8 +117,10 @@ def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[An
         # The correlation of an angle that does not move is noise.
         correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
         apart, label = ours - other, f"{label} {'xyz'[axis]}"
-        mean, sd = float(apart.mean()), float(apart.std())
-        comparisons.append(AngleComparison(joint.name, label, mean, sd, correlation, ours.size))
+        mean, sd, rms = float(apart.mean()), float(apart.std()), float("nan")
+        if here:
+            rms = float(np.sqrt(np.nanmean((here[side][name][known] - other) ** 2)))
+        comparisons.append(AngleComparison(joint.name, label, mean, sd, correlation, ours.size, rms))
     return tuple(comparisons)
 
 
@@ -136,18 +145,42 @@ def file_curves(
     person goes. Where the pelvis of ``ours``, the curves of the same cycle, is turned otherwise by more than
     `_OBLIQUE` on average, they are no curves of the same thing and are left out.
     """
+    named = {name: (outputs.angles.get(f"{cycle.side[:1].upper()}{of}"), k) for name, (of, k) in _PLUG_IN_GAIT.items()}
+    told = {name: some[:, k] for name, (some, k) in named.items() if some is not None and len(some) == time.size}
+    yield from _beside(cycle, told, time, ours)
+
+
+def _beside(
+    cycle: cut.Cycle, angles: Mapping[str, Array], time: Array, ours: Sequence[CycleCurve]
+) -> Iterator[CycleCurve]:
+    """Yield ``angles`` (T,) deg by quantity over a gait cycle, as far as they are of the same thing as ``ours``."""
     if cycle.kind != "gait":
         return
-    found = []
-    for quantity, (label, axis) in _PLUG_IN_GAIT.items():
-        theirs = outputs.angles.get(f"{cycle.side[:1].upper()}{label}")
-        if theirs is not None and len(theirs) == time.size:
-            # Wrapped to [-180, 180).
-            found.append(over_cycle(cycle, quantity, cycle.side, "deg", time, (theirs[:, axis] + 180) % 360 - 180))
+    # Wrapped to [-180, 180).
+    wrapped = {name: (angle + 180) % 360 - 180 for name, angle in angles.items()}
+    theirs = [over_cycle(cycle, name, cycle.side, "deg", time, angle) for name, angle in wrapped.items()]
     # Mean over the cycle of theirs less ours.
-    turned = [[one.value for one in some if one.quantity == "pelvis_rotation"] for some in (ours, found)]
+    turned = [[one.value for one in some if one.quantity == "pelvis_rotation"] for some in (ours, theirs)]
     oblique = not all(turned) or not abs(np.nanmean(turned[1][0] - turned[0][0])) < _OBLIQUE
-    yield from (one for one in found if not (oblique and _PLUG_IN_GAIT[one.quantity][0] in _AGAINST_LAB))
+    yield from (one for one in theirs if not (oblique and _PLUG_IN_GAIT[one.quantity][0] in _AGAINST_LAB))
+
+
+def conventional_curves(
+    cycle: cut.Cycle, conventional: ConventionalTrial | None, body: Body, motion: Motion, ours: Sequence[CycleCurve]
+) -> Iterator[CycleCurve]:
+    """Yield the angles of the conventional gait model over a gait cycle, under our names.
+
+    Pelvis and foot against the axis of the laboratory that lies nearest to the way of the cycle, as plug-in gait has
+    them, and left out as those of a file are (`file_curves`), beside ``ours``.
+    """
+    if conventional is None or cycle.kind != "gait":
+        return
+    part = cycle.frames(motion.time)
+    time = motion.time[part]
+    way = direction_of(cycle, poses(body, motion.q[part]), time)
+    axis = int(np.argmax(np.abs(way)))
+    angles = conventional.angles(cycle.side, np.sign(way[axis]) * np.eye(2)[axis], part)
+    yield from _beside(cycle, angles, time, ours)
 
 
 _WORDS = {
@@ -168,7 +201,8 @@ class TrialMovement:
     them, pelvis, foot progression and centre of mass, envelopes of EMG channels (mV); ``strides`` spatio-temporal
     values of every gait cycle; ``late`` (n,) s for strikes and for leavings: how much later the markers tell them than
     the plates; ``file_angles``, ``file_events`` ours beside those that another program wrote into the same file;
-    ``file_curves`` plug-in gait's own angles over the gait cycles; ``lifts`` depth, height, force share of the feet and
+    ``file_curves`` plug-in gait's own angles over the gait cycles, ``conventional_curves`` the same of the conventional
+    gait model, computed here from the markers; ``lifts`` depth, height, force share of the feet and
     rise of the force of every squat, rise and jump; ``shared`` gait cycles in which both feet stood on one plate (there
     the loads of the leg are not known); ``notes`` what a person should know.
 
@@ -187,6 +221,7 @@ class TrialMovement:
     file_angles: tuple[AngleComparison, ...] = ()
     file_events: tuple[EventComparison, ...] = ()
     file_curves: tuple[CycleCurve, ...] = ()
+    conventional_curves: tuple[CycleCurve, ...] = ()
     lifts: tuple[Stride, ...] = ()
     shared: tuple[cut.Cycle, ...] = ()
     notes: tuple[str, ...] = ()
@@ -299,11 +334,13 @@ def trial_movement(
     sip: Sip | None = None,
     contact: Contact | None = None,
     outputs: FileOutputs = NO_OUTPUTS,
+    conventional: ConventionalTrial | None = None,
 ) -> TrialMovement:
     """Return what moved in a prepared trial.
 
     ``sip`` what is known of the inertial parameters (by default the body's), ``contact`` with the plates (None: no
-    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file.
+    forces, so that only trunk and arms have moments), ``outputs`` of other programs in the trial's file,
+    ``conventional`` the conventional gait model on its markers.
 
     Raises
     ------
@@ -326,11 +363,12 @@ def trial_movement(
     whole = np.asarray(known_of_feet.all(axis=1))
     sure = whole & ~shared
     on_one = [one for one in cycles if shared[(motion.time >= one.start) & (motion.time <= one.end)].any()]
-    curves, theirs = list[CycleCurve](), list[CycleCurve]()
+    curves, theirs, usual = list[CycleCurve](), list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         curves += own
         theirs += file_curves(cycle, outputs, motion.time, own)
+        usual += conventional_curves(cycle, conventional, body, motion, own)
         curves += emg_curves(cycle, outputs)
         if feet is not None:
             # in gait the force under a foot does not count while both are on one plate
@@ -344,9 +382,10 @@ def trial_movement(
         tuple(curves),
         strides(cycles, events, body, soles, centre),
         cut.agreement_of_events(force, markers),
-        compare_angles(body, motion, outputs),
+        compare_angles(body, motion, outputs, conventional),
         compare_events(events, outputs),
         tuple(theirs),
+        tuple(usual),
         tuple(lift(one, centre, motion.time, weight, feet, sure, whole) for one in cycles if one.kind != "gait"),
         tuple(one for one in on_one if one.kind == "gait"),
         _notes(cycles, on_one, contact),

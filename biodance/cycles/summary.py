@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -236,7 +236,8 @@ class KeySummary:
     """A key value of both sides: its ``quantity``, which ``key`` of it, ``unit``; ``right`` and ``left`` over all good
     repetitions (None = no value); ``difference`` right less left with its 95 % interval ``ci95`` by the scatter between
     repetitions (None for fewer than three); ``symmetry`` %, see `symmetry_index` (NaN where it means nothing);
-    ``beside`` the same by side as another program has it; ``middle`` of trunk and pelvis where both sides move alike.
+    ``beside`` the same by side as another program has it, ``conventional`` of the conventional gait model, computed
+    here; ``middle`` of trunk and pelvis where both sides move alike.
     """
 
     quantity: str
@@ -248,6 +249,7 @@ class KeySummary:
     ci95: tuple[float, float] | None
     symmetry: float
     beside: Mapping[str, Spread]
+    conventional: Mapping[str, Spread]
     middle: Spread | None = None
 
     @property
@@ -268,7 +270,8 @@ class Repetitions:
     """All good repetitions of one ``kind`` in a session, over all its trials.
 
     ``cycles`` all that were found; ``curves`` and ``strides`` of those that count; ``left_out`` what does not, and why;
-    ``file_curves`` plug-in gait's own angles over the same cycles.
+    ``file_curves`` plug-in gait's own angles over the same cycles, ``conventional_curves`` those of the conventional
+    gait model, computed here.
     """
 
     kind: str
@@ -277,6 +280,7 @@ class Repetitions:
     strides: tuple[Stride, ...]
     left_out: tuple[LeftOutCurve, ...] = ()
     file_curves: tuple[CycleCurve, ...] = ()
+    conventional_curves: tuple[CycleCurve, ...] = ()
 
     @cached_property
     def good(self) -> tuple[Cycle, ...]:
@@ -300,6 +304,16 @@ class Repetitions:
         return group_curves(self.file_curves)
 
     @cached_property
+    def conventional_groups(self) -> tuple[CurveGroup, ...]:
+        """The same of the conventional gait model."""
+        return group_curves(self.conventional_curves)
+
+    @property
+    def beside(self) -> tuple[CurveGroup, ...]:
+        """Plug-in gait's angles from the files, where they hold none as computed here."""
+        return self.file_groups or self.conventional_groups
+
+    @cached_property
     def key_values(self) -> tuple[KeyValue, ...]:
         """The key values of every repetition."""
         return key_values(self.curves)
@@ -307,9 +321,9 @@ class Repetitions:
     @cached_property
     def keys(self) -> tuple[KeySummary, ...]:
         """The key values of both sides beside each other."""
-        both = (self.key_values, key_values(self.file_curves))
-        ours, theirs = (grouped(((one.quantity, one.key), one) for one in values) for values in both)
-        return tuple(_summary(some, theirs.get(about, ())) for about, some in ours.items())
+        three = (self.key_values, key_values(self.file_curves), key_values(self.conventional_curves))
+        ours, theirs, usual = (grouped(((one.quantity, one.key), one) for one in values) for values in three)
+        return tuple(_summary(some, theirs.get(about, ()), usual.get(about, ())) for about, some in ours.items())
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -347,7 +361,12 @@ def spread(values: Iterable[float]) -> Spread | None:
     return Spread(float(known.mean()), float(known.std(ddof=1)) if known.size > 1 else float("nan"), known.size)
 
 
-def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue]) -> KeySummary:
+def _by_side(values: Sequence[KeyValue]) -> dict[str, Spread]:
+    """Return mean, sd and number of a key value of each side that has one."""
+    return {side: found for side in SIDES if (found := spread(one.value for one in values if one.side == side))}
+
+
+def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue], usual: Sequence[KeyValue]) -> KeySummary:
     """Return one key value of both sides."""
     sides = {side: np.array([one.value for one in some if one.side == side]) for side in SIDES}
     right, left = (spread(sides[side]) for side in SIDES)
@@ -357,9 +376,9 @@ def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue]) -> KeySummary
         change = change_of_mean(visit_mean(sides["left"]), visit_mean(sides["right"]))
         difference, ci95 = change.value, change.interval
         symmetry = symmetry_index(right.mean, left.mean) if first.unit != "deg" or first.key == "range" else np.nan
-    beside = {side: found for side in SIDES if (found := spread(one.value for one in theirs if one.side == side))}
     middle = spread(one.value for one in some if one.side == "middle")
-    return KeySummary(first.quantity, first.key, first.unit, right, left, difference, ci95, symmetry, beside, middle)
+    others = _by_side(theirs), _by_side(usual)
+    return KeySummary(first.quantity, first.key, first.unit, right, left, difference, ci95, symmetry, *others, middle)
 
 
 def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
@@ -372,12 +391,11 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     cycles = tuple(one for trial in trials for one in trial.cycles if one.kind == kind)
     turned = _turned(trials) if kind == "gait" else []
 
-    def counts(one: CycleCurve | Stride) -> bool:
-        return one.cycle.kind == kind and one.cycle not in turned
+    def counted(*names: str) -> tuple[Any, ...]:
+        every = (one for trial in trials for name in names for one in getattr(trial, name))
+        return tuple(one for one in every if one.cycle.kind == kind and one.cycle not in turned)
 
-    curves = tuple(filter(counts, chain.from_iterable(trial.curves for trial in trials)))
-    values = tuple(filter(counts, chain.from_iterable((*trial.strides, *trial.lifts) for trial in trials)))
-    theirs = tuple(filter(counts, chain.from_iterable(trial.file_curves for trial in trials)))
+    curves, values = counted("curves"), counted("strides", "lifts")
     shared = [one for trial in trials for one in trial.shared if one.kind == kind and one not in turned]
     of_one = grouped(((one.quantity, one.side), one) for one in curves)
     spikes = [one for same in of_one.values() for one in _spikes(same)]
@@ -387,7 +405,7 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
         *(LeftOutCurve(one.cycle, one.quantity, LeftOutBecause.SPIKE) for one in spikes),
     )
     kept = tuple(one for one in curves if one not in spikes)
-    return Repetitions(kind, cycles, kept, values, left_out, theirs)
+    return Repetitions(kind, cycles, kept, values, left_out, counted("file_curves"), counted("conventional_curves"))
 
 
 def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:

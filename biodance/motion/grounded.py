@@ -194,18 +194,18 @@ def _q(
     angle: Array, turn: Array, place: Array, foot: NDArray[np.intp], *, base: BaseSeen | None, tilt: Array | None = None
 ) -> Array:
     """Return configurations (T, nq) of a robot on ``foot`` (T,); ``tilt`` (T, 3) rad turns its sole from flat."""
+    from scipy.spatial.transform import Rotation
+
     rotation, position = _chained(turn, place, foot)
     # Middle of the standing sole in the frame of the first one: it stays where it is under any turn.
     middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
     if tilt is not None:
-        from scipy.spatial.transform import Rotation
-
         lean_over = np.asarray(Rotation.from_rotvec(tilt).as_matrix())
         rotation = lean_over @ rotation
         position = middle + np.einsum("tij,tj->ti", lean_over, position - middle)
     if base is not None:
         rotation, position = base.corrected(rotation, position, middle)
-    return np.concatenate([position, _quaternions(rotation), angle], axis=1)
+    return np.concatenate([position, Rotation.from_matrix(rotation).as_quat(), angle], axis=1)
 
 
 def ground_again(
@@ -318,12 +318,6 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
         rotation[start:stop] = yaw @ np.swapaxes(turn[side, start:stop], 1, 2)
         position[start:stop] = at - np.einsum("tij,tj->ti", rotation[start:stop], place[side, start:stop])
     return rotation, position
-
-
-def _quaternions(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(rotation).as_quat())
 
 
 # Both paths are complex numbers x + i y. Between a path and the same path turned, shifted and late, the normalised

@@ -178,8 +178,9 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
     turn = np.zeros((*points.shape, body.nv))
     if body.n_root:
         turn[..., 3:6] = np.eye(3)
-    for j, on, axis in _axes_before(body, pose, segment):
-        turn[..., body.n_root + j][:, on] = axis
+    for j, hangs in enumerate(below(body)[:, segment]):
+        # Every segment that hangs on a joint turns about its axis, in the lab.
+        turn[..., body.n_root + j][:, hangs > 0] = (pose.joint_rotation[:, j] @ body.joints[j].axis)[:, None]
     return place_jacobian(body, pose, segment, points), turn.reshape(len(turn), -1, body.nv)
 
 
@@ -207,9 +208,3 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
     known = pose.joint_rotation, pose.joint_position, pose.root_position
     rotation, origin, root = (np.ascontiguousarray(one) for one in known)
     return PlacedJoints(joint_arrays(body)[3], rotation, origin, root, body.n_root)
-
-
-def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:
-    """Yield every joint, which of the segments hang on it, and its axis (T, 1, 3) in the lab."""
-    for j, hangs in enumerate(below(body)[:, segment]):
-        yield j, np.flatnonzero(hangs), (pose.joint_rotation[:, j] @ body.joints[j].axis)[:, None]

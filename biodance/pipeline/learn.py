@@ -50,7 +50,7 @@ _FEWEST_LEGS = 6
 @dataclass(frozen=True, eq=False)
 class MeasuredWalk:
     """How one ``person`` moved in a ``session``: ``curves`` over all good repetitions, ``beside`` those of plug-in
-    gait in the same files, gait ``vectors`` by side (n, 459) deg.
+    gait, from the same files or computed here, gait ``vectors`` by side (n, 459) deg.
     """
 
     session: str
@@ -68,7 +68,7 @@ def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
     found = gait_vectors(moved.gait.curves) if moved.gait else {}
     by_side = {side: [vector for cycle, vector in found.items() if cycle.side == side] for side in SIDES}
     vectors = {side: np.stack(rows) for side, rows in by_side.items() if rows}
-    beside = moved.gait.file_groups if moved.gait else ()
+    beside = moved.gait.beside if moved.gait else ()
     return MeasuredWalk(session, result.subject.name or session, curves, beside, vectors)
 
 

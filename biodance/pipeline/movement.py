@@ -1,12 +1,14 @@
 """What moved in a visit: every trial's events, cycles and curves, with the parameters that the visit identified."""
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biodance import display
+from biodance.body.human.conventional import ConventionalModel, conventional_model
 from biodance.cycles.movement import TrialMovement
 from biodance.cycles.scores import GaitScores, gait_scores
 from biodance.cycles.strides import STRIDE_UNITS
@@ -83,12 +85,13 @@ class SessionMovement:
         return self.repetitions.get("gait")
 
     @cached_property
-    def scores(self) -> tuple[GaitScores | None, GaitScores | None]:
-        """Gait scores of our angles and of those in the files; None without a reference."""
+    def scores(self) -> tuple[GaitScores | None, GaitScores | None, GaitScores | None]:
+        """Gait scores of our angles, the files', the conventional gait model's; None without a reference."""
         if self.gait is None:
-            return None, None
+            return None, None, None
         ours = gait_scores(self.gait.curves, self.healthy.normal, self.healthy.deviation)
-        return ours, gait_scores(self.gait.file_curves, self.healthy.beside)
+        beside = gait_scores(self.gait.file_curves, self.healthy.beside)
+        return ours, beside, gait_scores(self.gait.conventional_curves, self.healthy.beside)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.
@@ -191,11 +194,11 @@ def describe_movement(
         session = examine(read, tell=tell)
     healthy, body = read_lab(lab), session.body
     sip = session.identification.proven if session.identification else None
-    trials, left_out = [], {}
+    trials, left_out, conventional = [], {}, _conventional_model(session)
     for k, one in enumerate(session.trials, 1):
         tell(f"describing {one.name}, {k} of {len(session.trials)}")
         try:
-            trials.append(movement_of(one, body, sip))
+            trials.append(movement_of(one, body, sip, conventional))
         except BiodanceError as why:
             left_out[one.name] = str(why)
     # moments and powers are divided by the mass of the body that they are computed with
@@ -203,3 +206,12 @@ def describe_movement(
     kg = float(used.mass.sum()) if used is not None else float("nan")
     parameters = "table" if sip is None else "identified"
     return SessionMovement(session.session.folder.name, tuple(trials), parameters, kg, left_out, healthy)
+
+
+def _conventional_model(session: SessionResult) -> ConventionalModel | None:
+    """Return the conventional gait model by the first static trial that has what it needs; None without one."""
+    for one in session.trials:
+        if one.trial.role == "static":
+            with suppress(BiodanceError):
+                return conventional_model(session.subject, one.trial)
+    return None

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.human.conventional import ConventionalModel
 from biodance.body.human.skeleton import marker_groups
 from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
@@ -209,7 +210,9 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
     return seconds_left_out(masks, one.motion.rate)
 
 
-def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:
+def movement_of(
+    one: TrialResult, body: Body | None, sip: Sip | None, conventional: ConventionalModel | None = None
+) -> TrialMovement:
     """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters. Raises
     TrialRefused: the trial gives no motion, or one too short.
     """
@@ -218,7 +221,8 @@ def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMo
     outputs, contact = NO_OUTPUTS, contact_of(one, body)
     with suppress(BiodanceError):  # what else its file holds, where that can be read again
         outputs = read_outputs(one.trial.source.path) if one.trial.source.format == "C3D" else NO_OUTPUTS
-    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=outputs)
+    legs = conventional.of(one.trial) if conventional else None
+    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=outputs, conventional=legs)
 
 
 def contact_of(one: TrialResult, body: Body) -> Contact | None:

@@ -7,6 +7,7 @@ where the format knows them, markers, limits and boxes. All lengths in m, angles
 
 import inspect
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Protocol
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
@@ -92,6 +94,14 @@ def _branch(body: Body, segment: int) -> Branch:
 def row(values: Iterable[float] | Array) -> str:
     """Return numbers separated by blanks, each with all its digits."""
     return " ".join(repr(float(v) + 0.0) for v in np.ravel(np.asarray(values, dtype=float)))
+
+
+def euler_angles(order: str, rotation: Array) -> Array:
+    """Return (3,) rad about the axes in ``order``, as scipy writes it: "XYZ" for R = Rx Ry Rz (an OpenSim frame), "xyz"
+    for R = Rz Ry Rx (roll, pitch, yaw); the last one is zero where the middle one is +-90 degrees.
+    """
+    with warnings.catch_warnings(action="ignore"):  # of that posture, in which two of them are one turn
+        return np.asarray(Rotation.from_matrix(rotation).as_euler(order))
 
 
 def plain_name(name: str) -> str:

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export import WORLD, Branch, add, plain_name, row, segment_tree, six, xml_document
+from biodance.body.export import WORLD, Branch, add, euler_angles, plain_name, row, segment_tree, six, xml_document
 from biodance.body.parts import UPRIGHT, rigid_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.errors import BiodanceError
@@ -97,7 +97,7 @@ def _joint(joints: Element, body: Body, branch: Branch) -> None:
     frame = add(add(element, "frames"), "PhysicalOffsetFrame", name="parent_offset")
     add(frame, "socket_parent", "/ground" if on_world else f"/bodyset/{body.segments[branch.parent]}")
     add(frame, "translation", row(branch.translation))
-    add(frame, "orientation", row(_body_fixed_xyz(branch.rotation)))
+    add(frame, "orientation", row(euler_angles("XYZ", branch.rotation)))
     transform = add(element, "SpatialTransform")
     if free:
         turns, names = _ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
@@ -152,13 +152,3 @@ def _axes(body: Body, branch: Branch) -> Array:
         value, vector = np.linalg.eigh(rest @ rest.T)
         axes.append(vector[:, np.argmax(value)])
     return np.array(axes)
-
-
-def _body_fixed_xyz(rotation: Array) -> Array:
-    """Return (3,) rad with ``rotation = Rx Ry Rz``, the orientation of an OpenSim frame; z is zero at y = +-90 deg."""
-    across = np.hypot(rotation[0, 0], rotation[0, 1])
-    # R = Rx Ry Rz: R02 = sin y, R12 = -sin x cos y, R01 = -cos y sin z.
-    y = np.arctan2(rotation[0, 2], across)
-    if across < 1e-9:
-        return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), y, 0.0])
-    return np.array([np.arctan2(-rotation[1, 2], rotation[2, 2]), y, np.arctan2(-rotation[0, 1], rotation[0, 0])])

@@ -6,25 +6,12 @@ inertia.
 
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from biodance.body.body import Body
-from biodance.body.export import add, link_names, row, xml_document
+from biodance.body.export import add, euler_angles, link_names, row, xml_document
 from biodance.body.parts import rigid_inertia
-from biodance.records import Array
 
 FORMAT = "urdf"
 SUFFIX = ".urdf"
-
-
-def roll_pitch_yaw(rotation: Array) -> Array:
-    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; at pitch = +-90 deg with yaw zero."""
-    across = np.hypot(rotation[0, 0], rotation[1, 0])
-    # R = Rz Ry Rx: R20 = -sin pitch, R21 = cos pitch sin roll, R10 = cos pitch sin yaw.
-    pitch = np.arctan2(-rotation[2, 0], across)
-    if across < 1e-9:
-        return np.array([np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(rotation[2, 1], rotation[2, 2]), pitch, np.arctan2(rotation[1, 0], rotation[0, 0])])
 
 
 def text(body: Body, source: str) -> str:
@@ -41,7 +28,7 @@ def text(body: Body, source: str) -> str:
         first = body.segments[0] if body.n_root else "world"
         add(element, "parent", link=names[joint.parent] if joint.parent >= 0 else first)
         add(element, "child", link=names[i])
-        add(element, "origin", xyz=row(joint.translation), rpy=row(roll_pitch_yaw(joint.rotation)))
+        add(element, "origin", xyz=row(joint.translation), rpy=row(euler_angles("xyz", joint.rotation)))
         add(element, "axis", xyz=row(joint.axis))
         effort = max(-limits.torque_lower[i], limits.torque_upper[i])
         ranges = {"lower": limits.lower[i], "upper": limits.upper[i], "velocity": limits.velocity[i], "effort": effort}

@@ -41,7 +41,6 @@ from biodance.body.parts import (
     SegmentMarkers,
     inertial_parameters,
     lump_from,
-    mirror_inertia,
     parameter_jacobian,
     stretch_inertia,
     turn_inertia,
@@ -243,7 +242,8 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
             usual = proportion("heel_behind_ankle", subject.sex) * skeleton.lengths[segment]
             ahead = usual - skeleton.heel_behind_ankle[segment.removesuffix("_foot")]
             lump = replace(lump, com=lump.com + np.array([ahead, 0.0, 0.0]))
-        lumps.append(lump if side_of(segment) > 0 else mirror_inertia(lump))
+        # The other body side is the mirror image at z = 0.
+        lumps.append(lump if side_of(segment) > 0 else turn_inertia(lump, np.diag([1.0, 1.0, -1.0])))
     return tuple(lumps)
 
 

@@ -124,17 +124,17 @@ _MM = 1e-3
 
 
 def unit(vector: Array) -> Array:
-    """Return the vector (3,) with length 1."""
-    return np.asarray(vector / np.linalg.norm(vector))
+    """Return vectors (..., 3) with length 1."""
+    return np.asarray(vector / np.sqrt(np.vecdot(vector, vector))[..., None])
 
 
 def pelvis_frame(right_asis: Array, left_asis: Array, mid_psis: Array) -> tuple[Array, Array]:
-    """Return lab_R_pelvis (3, 3) (z to the right ASIS, x forwards; ISB) and the middle of the ASIS (3,) m."""
+    """Return lab_R_pelvis (..., 3, 3) (z to the right ASIS, x forwards; ISB) and the middle of the ASIS (..., 3) m."""
     middle = (right_asis + left_asis) / 2
     z = unit(right_asis - left_asis)
     y = unit(np.cross(z, middle - mid_psis))
     # y square to z and to the sacral line: up; x = y x z forwards.
-    return np.stack([np.cross(y, z), y, z], axis=1), middle
+    return np.stack([np.cross(y, z), y, z], axis=-1), middle
 
 
 def davis_hip(pelvis_width: float, leg_length: float, asis_to_trochanter: float, marker_radius: float) -> Array:
@@ -163,7 +163,7 @@ def harrington_hip(pelvis_width: float, pelvis_depth: float) -> Array:
 
 
 def chord(proximal: Array, marker: Array, distance: float, away_from: Array) -> Array:
-    """Return the joint centre (3,) m at ``distance`` m from a lateral marker, with a right angle between marker and
+    """Return joint centres (..., 3) m at ``distance`` m from a lateral marker, with a right angle between marker and
     proximal centre.
 
     It lies in the plane of the proximal centre, the marker and the point ``away_from`` (a wand marker), on the side
@@ -171,10 +171,10 @@ def chord(proximal: Array, marker: Array, distance: float, away_from: Array) -> 
     marker diameter) / 2.
     """
     arm = proximal - marker
-    reach = float(np.linalg.norm(arm))
+    reach = np.sqrt(np.vecdot(arm, arm))[..., None]
     along = arm / reach
     side = unit(np.cross(np.cross(along, away_from - marker), along))
-    cosine = min(distance / reach, 1.0)
+    cosine = np.minimum(distance / reach, 1.0)
     # Right angle at the centre: at the marker cos = distance / reach.
     return np.asarray(marker + distance * (cosine * along - np.sqrt(1 - cosine**2) * side))
 

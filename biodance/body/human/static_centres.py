@@ -85,7 +85,7 @@ def static_centres(
     Trunk: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
     ``flat``: the feet stand flat; otherwise each lies as its heel and toe markers do.
     """
-    pelvis, hips = _hip_centres(mark, sizes, hip=hip)
+    pelvis, hips = hip_centres(mark, sizes, hip=hip)
     middle = (hips["right"] + hips["left"]) / 2
     shoulders = _shoulder_centres(mark, sizes, middle)
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
@@ -113,8 +113,8 @@ def static_centres(
     return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes), sole=sole)
 
 
-def _hip_centres(place: _Places, sizes: measures.Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
-    """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
+def hip_centres(place: _Places, sizes: measures.Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+    """Return lab_R_pelvis (..., 3, 3) and the hip centres by side, (..., 3) m, from landmarks (..., 3) m."""
     rotation, middle = measures.pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
     legs = float(np.mean(list(sizes.leg_length.values())))
     centres = {}
@@ -237,7 +237,7 @@ def segment_frames(centres: Centres) -> SegmentFrames:
     hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
     hips = hips if centres.mid_hip is None else centres.mid_hip
     axis = shoulders - hips
-    rotation = {"pelvis": centres.pelvis, "trunk_head": _frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
+    rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
     origin = {"pelvis": hips, "trunk_head": at["trunk"]}
     for side in SIGN:
         for names, joints in (
@@ -253,16 +253,16 @@ def segment_frames(centres: Centres) -> SegmentFrames:
                 centres.right[f"{side}_{joints[1]}"],
             )
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
-        rotation[f"{side}_foot"] = _frame_yz(centres.sole.get(side, UP), centres.across[side])
+        rotation[f"{side}_foot"] = frame_yz(centres.sole.get(side, UP), centres.across[side])
     ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
     return SegmentFrames(rotation, origin, ends, hips + centres.cut * axis)
 
 
-def _frame_yz(up: Array, right: Array) -> Array:
-    """Return (3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
+def frame_yz(up: Array, right: Array) -> Array:
+    """Return (..., 3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
     y = measures.unit(up)
     x = measures.unit(np.cross(y, right))
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def _chain(
@@ -274,7 +274,7 @@ def _chain(
 ) -> None:
     """Fill in the two segments of a limb: the second flexes about z of the first, tilted about its own x (varus)."""
     (upper, lower), (top, middle, end) = names, centres
-    rotation[upper], origin[upper], origin[lower] = _frame_yz(top - middle, right), top, middle
+    rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ measures.unit(middle - end)
     # y of the lower segment: Rz(f) Rx(v) e_y = (-sin f cos v, cos f cos v, sin v).
     flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])

@@ -99,11 +99,11 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
     TrialRefused
         The trials show no marker of the body, or no frame determines a posture.
     """
-    postures = spread_postures(trials, scaling.with_centres(scaling.centres)[0].markers.names)
+    body = scaling.with_centres(scaling.centres)[0]
+    postures = spread_postures(trials, body.markers.names)
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
-    body = scaling.with_centres(scaling.centres)[0]
     place = poses(body, fresh.q).points(list(body.markers.segment), body.markers.position)
     shows = np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)) < _NO_POSTURE
     if not shows.any():
@@ -218,7 +218,8 @@ def _told(
     errors = tuple(error(joint) for joint in JOINTS if joint in moved or joint in spared)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = _placed_notes(moved, turned, start, found)
-    notes += _unseen_notes([joint for joint in kept if joint not in refused])
+    if unseen := ", ".join(joint.replace("_", " ") for joint in kept if joint not in refused):
+        notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {unseen}.")
     notes += [_outside(joint, far) for joint, far in refused.items()]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
@@ -236,12 +237,6 @@ def _placed_notes(
     each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
     fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
     return [f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}."] if each else []
-
-
-def _unseen_notes(joints: Sequence[str]) -> list[str]:
-    """Say which joints the movement does not show, if any."""
-    names = ", ".join(joint.replace("_", " ") for joint in joints)
-    return [f"Joints that the movement does not show, kept where the static trial puts them: {names}."] if names else []
 
 
 def _outside(joint: str, far: float) -> str:

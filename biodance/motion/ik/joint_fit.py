@@ -119,7 +119,7 @@ def _markers(cost: tuple[Array, Array], markers: MarkerSlopes, free: Index) -> d
     # Schur complement: the joints' unknowns adapt to markers that lie elsewhere.
     pull = markers.gradient - markers.shared[:, free] @ inner[:, -1]
     left = markers.information - markers.shared[:, free] @ inner[:, :-1]
-    covariance = np.linalg.inv(left + usual * np.eye(len(left)))
+    covariance: Array = np.linalg.inv(left + usual * np.eye(len(left))).astype(float)
     place = covariance @ pull
     return {
         name: _wider(covariance[own, own], place[own], usual, moved)

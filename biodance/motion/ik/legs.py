@@ -37,16 +37,8 @@ class Leg:
         index = tuple(body.joint_index(f"{side}_{name}") for name in LEG)
         hip, knee, ankle = (body.joints[index[k]] for k in (0, 3, 4))
         sign = -1.0 if side == "left" else 1.0
-        return cls(
-            index,
-            sign,
-            hip.translation,
-            hip.rotation,
-            knee.translation,
-            knee.rotation,
-            ankle.translation,
-            ankle.rotation,
-        )
+        placed = [place for joint in (hip, knee, ankle) for place in (joint.translation, joint.rotation)]
+        return cls(index, sign, *placed)
 
     @staticmethod
     def fits(body: Body, side: str) -> bool:
@@ -99,7 +91,9 @@ class Leg:
         leg = -(self.shank + np.einsum("tji,j->ti", bend, self.knee_turn.T @ self.thigh))
         leg = leg @ self.ankle_turn
         # The inversion about x is fixed by the component that the dorsiflexion about z leaves alone.
-        inversion = _solve_sine(local[:, 1], local[:, 2], leg[:, 2])
+        # y sin i + z cos i = hypot(y, z) sin(i + atan2(z, y)), with (y, z) of the way from the ankle.
+        across = np.hypot(local[:, 1], local[:, 2])
+        inversion = np.arcsin(np.clip(leg[:, 2] / across, -1.0, 1.0)) - np.arctan2(local[:, 2], local[:, 1])
         cosine, sine = np.cos(inversion), np.sin(inversion)
         y = cosine * local[:, 1] - sine * local[:, 2]
         # Angle between the two directions in the plane of the dorsiflexion.
@@ -122,12 +116,6 @@ def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
     """Return ``value`` as it is below ``limit - width``, smoothly (three derivatives) nearing ``limit`` above."""
     over = np.maximum(value - (limit - width), 0.0) / width
     return np.where(over > 0, limit - width + width * (over / (1 + over**4) ** 0.25), value)
-
-
-def _solve_sine(y: Array, z: Array, wanted: Array) -> Array:
-    """Return the small angle i with ``y sin i + z cos i = wanted``."""
-    # y sin i + z cos i = hypot(y, z) sin(i + atan2(z, y)).
-    return np.arcsin(np.clip(wanted / np.hypot(y, z), -1.0, 1.0)) - np.arctan2(z, y)
 
 
 KNEE = 3

@@ -66,7 +66,7 @@ def repetitions_figure(
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
             usual = [svg.Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
-            files = [one for one in found.file_groups if one.quantity == quantity]
+            files = [one for one in found.beside if one.quantity == quantity]
             theirs = [svg.Curve(f"{one.side}, plug-in gait", one.mean, _DOTTED[one.side]) for one in files]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
             curves = [*usual, *_curves(same), *theirs]

@@ -64,7 +64,7 @@ def movement_section(moved: SessionMovement) -> str:
     compared = [one for one in moved if one.file_angles]
     if not parts and not compared:
         return ""
-    beside = bool(moved.gait and moved.gait.file_curves)
+    beside = bool(moved.gait and moved.gait.beside)
     return render(
         "movement.html.j2",
         filters={"beside": _beside, "first_upper": first_upper},
@@ -145,7 +145,11 @@ def _flags(found: Repetitions) -> list[str]:
 
 def _key(one: KeySummary) -> Row:
     """Return one key value as a row of text."""
-    apart, unit = "–", "% of weight" if one.quantity in GROUND_PEAKS else one.unit
+    other, apart, unit = (
+        one.beside or one.conventional,
+        "–",
+        "% of weight" if one.quantity in GROUND_PEAKS else one.unit,
+    )
     if one.right and one.left:
         apart = _number(one.difference, one.unit)
         apart += f" ± {_number((one.ci95[1] - one.ci95[0]) / 2, one.unit)}" if one.ci95 else ""
@@ -155,7 +159,7 @@ def _key(one: KeySummary) -> Row:
         "left": _said(one.middle or one.left, one.unit),
         "apart": apart,
         "symmetry": format_number(one.symmetry, 0) if np.isfinite(one.symmetry) else "–",
-        **{f"file_{side}": _number(one.beside[side].mean, one.unit) if side in one.beside else "–" for side in SIDES},
+        **{f"file_{side}": _number(other[side].mean, one.unit) if side in other else "–" for side in SIDES},
     }
 
 
@@ -171,12 +175,12 @@ def _said(found: Spread | None, unit: str) -> str:
     return f"{_number(found.mean, unit)} ({about})"
 
 
-def _scores(ours: GaitScores | None, theirs: GaitScores | None) -> dict[str, Any]:
+def _scores(ours: GaitScores | None, files: GaitScores | None, here: GaitScores | None) -> dict[str, Any]:
     """Return the scores of both sides and the profile as rows of text, none without a reference."""
     if ours is None:
         return {"scores": ()}
     rows = [_score("gait profile score (deg)", ours.gps)]
-    if theirs is not None:
+    if (theirs := files or here) is not None:
         rows.append(_score("the same of plug-in gait's angles, against its own reference", theirs.gps))
     if ours.gdi:
         rows.append(_score("gait deviation index (100 = healthy)", ours.gdi))

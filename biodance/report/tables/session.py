@@ -30,8 +30,12 @@ _KEY = Schema(
         "right": _SPREAD,
         "left": _SPREAD,
         "beside": lambda one: {side: _SPREAD.row(told) for side, told in one.beside.items()},
+        "conventional": lambda one: {side: _SPREAD.row(told) for side, told in one.conventional.items()},
     },
 )
+
+
+_SCORED = ("ours", "beside", "conventional")
 
 
 def gait_document(moved: SessionMovement | None) -> Row | None:
@@ -41,8 +45,8 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
     mean, and because of what ("shared_plate", "spike", "turn"; ``quantity`` "" = all of the cycle, "loads" = its
     moments, powers and ground reaction); ``curves`` (101 values at 0 to 100 %) mean and sd between cycles, of angles
     (deg), moments (N·m/kg), powers (W/kg), ground reaction (% of body weight), centre of pressure on the sole (m);
-    ``beside`` plug-in gait's own where the files hold it; ``difference`` right less left; ``scores`` null without a
-    healthy reference.
+    ``beside`` plug-in gait's own where the files hold it, ``conventional`` the same model computed here; ``difference``
+    right less left; ``scores`` null without a healthy reference.
     """
     if moved is None or moved.gait is None:
         return None
@@ -62,8 +66,9 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
         ],
         "curves": _MEAN.rows(found.groups),
         "curves_beside": _MEAN.rows(found.file_groups),
+        "curves_conventional": _MEAN.rows(found.conventional_groups),
         "key_values": _KEY.rows(found.keys),
-        "scores": dict(zip(("ours", "beside"), map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
+        "scores": dict(zip(_SCORED, map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
     }
 
 
@@ -203,9 +208,9 @@ def _curve(group: CurveGroup) -> Row:
 
 EVENT_ROW = Schema("time_s=time side down source")
 FILE_ANGLE_ROW = Schema(
-    "joint label offset_deg=offset sd_deg=sd cc=correlation",
+    "joint label offset_deg=offset sd_deg=sd cc=correlation conventional_rms_deg=conventional",
     shown="trial: {trial} | joint: {joint:name} | offset (deg): {offset_deg:1} | sd (deg): {sd_deg:1} | "
-    "correlation: {cc:2}",
+    "correlation: {cc:2} | same model (deg): {conventional_rms_deg:1}",
 )
 _MOVED = Schema(
     "trial notes",
