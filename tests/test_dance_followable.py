@@ -44,7 +44,8 @@ def test_a_dance_asks_little_at_once_and_keeps_all_limits(searched) -> None:
     search, course = searched
     dance, steps = course.dance(search.work), course.steps
     for before, after in pairwise(steps):
-        changed = [part for part, word in after.words.items() if word.key != before.words[part].key]
+        was, now = (one.table.words_of(one.s) for one in (before, after))
+        changed = [part for part, word in now.items() if word.key != was[part].key]
         assert after.mirror or 1 <= len(changed) <= 2
     said = dance_instructions(dance)
     assert max(map(len, said)) <= 3

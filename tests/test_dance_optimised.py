@@ -9,16 +9,10 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
+from biodance.dance.expectation import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import (
-    SAMPLE_ERROR,
-    SAMPLE_RATE,
-    PostureInformation,
-    excitation_blocks,
-    learned,
-    update_posterior,
-)
+from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.plan import Plan
@@ -27,7 +21,8 @@ from biodance.dance.problem.stance import feet_in_move, stance
 from biodance.dance.search import course as course_module
 from biodance.dance.search import move as move_module
 from biodance.dance.search import optimised_course
-from biodance.dance.search.course import Checkpoint, Course, DesignContext, PlainStep
+from biodance.dance.search.course import Checkpoint, Course, DanceStep, DesignContext
+from biodance.dance.search.known_postures import PostureTable
 from biodance.dance.search.move import Move, Task
 from biodance.dance.search.optimised_course import affordable, feasible_course, nearest_neighbours
 from biodance.dance.search.postures import KEPT, alike, initial_guess, solve
@@ -149,7 +144,7 @@ TWO_FEET = Plan("small", "", (("parallel", 4),), hold=1.0)
 def course():
     rng, stances = np.random.default_rng(3), support_sequence(WOMAN, TWO_FEET)
     found = [solve(WOMANS, s, initial_guess(WOMANS, s, rng), no_objective, family(), iterations=30) for s in stances]
-    steps = tuple(PlainStep(one.x, s) for one, s in zip(found, stances, strict=True))
+    steps = tuple(DanceStep(PostureTable(CHAIN, s, one.x[None])) for one, s in zip(found, stances, strict=True))
     return Course(steps, (None,) * (len(steps) - 1))
 
 

@@ -20,7 +20,8 @@ from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, 
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
 from biodance.dance.search import word_course as word_search
-from biodance.dance.search.course import Course, DesignContext, PlainStep
+from biodance.dance.search.course import Course, DanceStep, DesignContext
+from biodance.dance.search.known_postures import PostureTable
 from biodance.dance.search.postures import KEPT, initial_guess, refuse, solve
 from biodance.dance.search.word_course import NoNextPosture, WordSearch, word_course
 from biodance.errors import BiodanceError
@@ -108,7 +109,7 @@ def test_only_where_nothing_is_left_a_dance_is_refused_with_joint_and_number() -
 
 @pytest.mark.parametrize(("bad", "kept"), [((4,), (5, 9)), ((0, 8), (1, 7)), ((1, 3, 5, 7, 9), None)])
 def test_the_longest_stretch_at_which_nobody_errs_is_left(bad: tuple[int, ...], kept: tuple[int, int] | None) -> None:
-    steps = tuple(PlainStep(np.full(3, float(p)), FEET, mirror=True) for p in range(10))
+    steps = tuple(DanceStep(PostureTable(Chain(BODY), FEET, np.full((1, 3), float(p))), mirror=True) for p in range(10))
     found = PerformersResult(1, (), tuple((p, "balance") for p in bad))
     shorter = safe_stretch(Course(steps, (None,) * 9), found)
     if kept is None:
@@ -123,7 +124,7 @@ def test_the_longest_stretch_at_which_nobody_errs_is_left(bad: tuple[int, ...], 
 
 def test_a_stretch_begins_and_ends_on_both_feet() -> None:
     feet = (FEET, FEET, replace(FEET, over=0), FEET.on(0), FEET.on(0), replace(FEET, over=0), FEET, FEET)
-    steps = tuple(PlainStep(np.full(3, float(p)), one) for p, one in enumerate(feet))
+    steps = tuple(DanceStep(PostureTable(Chain(BODY), one, np.full((1, 3), float(p)))) for p, one in enumerate(feet))
     shorter = safe_stretch(Course(steps, (None,) * 7), PerformersResult(1, (), ((0, "balance"), (4, "balance"))))
     assert shorter is not None
     assert [int(step.x[0]) for step in shorter.steps] == [6, 7]

@@ -8,7 +8,6 @@ is checked on the robot as it is.
 
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from biodance.body.body import Body
 from biodance.body.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.expectation import Expectation, evenly_spread
 from biodance.dance.limits import Limit
 from biodance.dance.limits.balance import Balance
 from biodance.dance.problem.chain import Chain
@@ -30,10 +28,6 @@ from biodance.dance.search.move import Task, exciting_move
 from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
-from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import Fit, empty, layout_for, statistics
-from biodance.motion.dynamics import predict_wrench
-from biodance.uncertainty.noise import Noise
 
 _WHERE = 4  # Beside the seed: what is searched for at random here
 
@@ -170,23 +164,3 @@ def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
         stances=tuple(small(stance) for stance in dance.stances),
         under=tuple(small(stance) for stance in dance.under),
     )
-
-
-ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
-"""N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
-_RATE = 4.0  # Hz: independent samples of the wrench
-_STEPS = 10  # Durations of a dance after which what is expected is told
-
-
-def expect_robot(dance: Dance) -> Expectation:
-    """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
-    # One band, the same error at all frequencies.
-    body, motion, noise = dance.body, dance.motion(_RATE), Noise(np.diag(ERROR**2)[None], np.zeros(3))
-    wrench, layout = predict_wrench(body, motion), layout_for(noise.about, noise.bands)
-    ends = [dance.phases[k].end for k in evenly_spread(dance, _STEPS)]
-    told = [empty(10 * len(body.segments), layout)]
-    for start, end in pairwise([0.0, *ends]):
-        use = (motion.time >= start) & (motion.time < end)
-        told.append(told[-1] + statistics(body, Fit(dance.protocol, motion, wrench, use), layout))
-    posteriors = [find_posterior(one.information(noise), body.sip) for one in told]
-    return Expectation.of(body, np.array([0.0, *ends]), posteriors)
