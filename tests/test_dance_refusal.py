@@ -13,16 +13,17 @@ from biodance.body.human.skeleton import joint_limits
 from biodance.dance.design import safe_stretch
 from biodance.dance.limits import family
 from biodance.dance.performers import PerformersResult
-from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
+from biodance.dance.problem.state import State
 from biodance.dance.search import word_course as word_search
 from biodance.dance.search.course import Course, DanceStep, DesignContext
 from biodance.dance.search.known_postures import PostureTable
-from biodance.dance.search.postures import KEPT, initial_guess, refuse, solve
+from biodance.dance.search.postures import KEPT, describe, initial_guess, refuse, solve
 from biodance.dance.search.word_course import NoNextPosture, WordSearch, word_course
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -70,6 +71,16 @@ def test_an_ankle_that_stays_pointed_cannot_stand() -> None:
     said = words(stiff, FEET)
     assert "both feet side by side" in said
     assert "ankle dorsiflexion (short by about" in said
+
+
+def test_a_posture_at_its_limit_lacks_the_reserve_and_not_minus_nothing() -> None:
+    chain, ends, knee = Chain(BODY), BODY.limits, BODY.joint_index("left_knee_flexion")
+    x = np.zeros((1, chain.size))
+    x[0, ROOT:] = (ends.lower + ends.upper) / 2
+    x[0, ROOT + knee] = ends.upper[knee]
+    limit = next(one for one in family() if one.name == "joint_range")
+    said = describe(State(chain, FEET, x, *np.zeros((2, 1, chain.size))), limit)
+    assert said == "joint range of left knee flexion (0 degrees left, less than its reserve)"
 
 
 # ---- known postures: what is not possible is left out, the rest is danced
