@@ -15,7 +15,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import ArmLift
-from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
+from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, PerformersResult, try_performers
 from biodance.dance.problem.plan import Plan
 from biodance.dance.search.course import Checkpoint, Course, DanceStep, DesignContext, Tell
 from biodance.dance.search.move import AMPLE, ENOUGH, other_moves
@@ -124,11 +124,11 @@ def _room(
     limits; those who came too near before dance ``first``, the others only if these have room.
     """
     limits, dance, room = search.work.plan.limits, course.dance(search.work), float("inf")
-    scale = {limit.name: limit.scale for limit in limits}
+    scale = {f"{limit.name}_{OF_PERFORMERS}": limit.scale for limit in limits}
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
     for who in (first, others[:_FEW], others[_FEW:]):
         found = try_performers(dance, limits, who=who, only=only, workers=workers)
-        room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
+        room = min(room, *(one.worst / scale[one.limit] for one in found.margins))
         if room < 0:
             break
     return room
@@ -228,9 +228,8 @@ def design(
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
         course, found = safe_course(work)
-        dance = course.dance(work)
-        danced = found.margins(dance)
-        dance = replace(dance, unsafe=broken(danced))
+        danced = found.margins
+        dance = replace(course.dance(work), unsafe=broken(danced))
     else:
         dance = optimised_course(work).dance(work)
     work.tell("checking every limit", 0, 0)

@@ -6,7 +6,6 @@ dance is designed, and shrunk again: the same angles, slower or faster. Nothing 
 is checked on the robot as it is.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from biodance.body.body import Body
 from biodance.body.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.limits import Limit
 from biodance.dance.limits.balance import Balance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -122,7 +120,6 @@ def design_robot(
     body: Body,
     plan: Plan,
     *,
-    limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
     tell: Tell | None = None,
     resume: Path | None = None,
@@ -135,7 +132,7 @@ def design_robot(
     BiodanceError
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
-    plan, to = plan.with_limits(limits), person_sized(body)
+    to = person_sized(body)
     long = person_sized_plan(plan, to)
     large, _ = design(similar_body(body, to), long, seed=seed, tell=tell, resume=resume)
     if tell is not None:
