@@ -11,6 +11,7 @@ import pytest
 from biodance.body.human.human import human
 from biodance.dance.expectation import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
 from biodance.dance.limits import family
+from biodance.dance.limits.ground_clearance import GroundClearance
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
@@ -249,6 +250,17 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
     move = move_module.exciting_move(task, np.zeros((12, 6, 6)), [1, 3, 0])
     assert (move.limit == "") is taken
     assert (tried == [2.0]) is taken
+
+
+def test_a_foot_on_its_way_is_designed_five_centimetres_over_the_floor_half_way() -> None:
+    """Lower, it drags, and whoever is played in MuJoCo falls over it; at both ends it stands."""
+    feet, limit, time = stance(BODY, "parallel").on(1), GroundClearance(), np.linspace(0.0, 2.0, 5)
+    task = Task(CHAIN, excitation_blocks(BODY), feet, np.zeros((2, CHAIN.size)), 2.0, (limit,))
+    asked = task.problem(task.straight(), [], time, reserve=move_module.RESERVE, objective=no_objective).reserve
+    height = limit.scale * asked[:, 0]
+    np.testing.assert_allclose(height[[0, 2, 4]], [0.0, 0.05, 0.0], atol=1e-12)
+    assert height[1] == pytest.approx(height[3])
+    assert 0.01 < height[1] < 0.05
 
 
 def test_parts_of_older_code_are_not_gone_on_with(tmp_path, monkeypatch):
