@@ -21,7 +21,7 @@ from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_bod
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.search.course import Checkpoint, DesignContext
 from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
-from biodance.dance.search.word_course import NoNextPosture, Reachability, WordSearch
+from biodance.dance.search.word_course import NoNextPosture, WordSearch
 from biodance.dance.verify import Margin, broken, verify
 from biodance.motion.kinematics import poses
 from biodance.report.dance import mannequin_svg
@@ -73,17 +73,19 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(searche
     assert not broken(verify(BODY, dance, PLAN.limits))
 
 
-def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched) -> None:
+def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched, monkeypatch) -> None:
     search, _ = searched
     both, over, *_ = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1))))
-    stand, shift = (search.reachability.table(feet) for feet in (both, over))
+    stand, shift = (search.table(feet) for feet in (both, over))
     work = replace(search.work, plan=replace(PLAN, instructions=2.0))
-    reach, all_ = Reachability(work, lambda *_: True), range(len(stand.index))
+    reach, all_ = WordSearch(work), range(len(stand.index))
+    monkeypatch.setattr(WordSearch, "can", lambda *_: True)
     left = [next(n for n in (1, 2, 3) if reach.leads(stand, s, shift, n)) for s in all_]
     words = [stand.words_of(s) for s in all_]
     assert {n for n, word in zip(left, words, strict=True) if word["trunk"].rest and word["legs"].rest} == {1}
     assert {n for n, word in zip(left, words, strict=True) if not word["trunk"].rest and not word["legs"].rest} == {2}
-    barred = Reachability(work, lambda *_: False)
+    monkeypatch.setattr(WordSearch, "can", lambda *_: False)
+    barred = WordSearch(work)
     assert not any(barred.leads(stand, s, shift, n) for s in all_ for n in (1, 3))
 
 

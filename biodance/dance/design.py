@@ -165,7 +165,7 @@ def _exchanged(search: WordSearch, course: Course, q: int) -> Iterator[Course]:
         posterior = search.posterior_after(posterior, before[:number], step)
 
     def on_from(step: DanceStep) -> DanceStep | None:
-        return None if after is None else search.reachability.link(step, after.table, after.s)
+        return None if after is None else search.link(step, after.table, after.s)
 
     def fits(step: DanceStep) -> bool:
         return step.key not in taken and (after is None or on_from(step) is not None)
@@ -183,7 +183,7 @@ def _without(search: WordSearch, course: Course, p: int, found: PerformersResult
     steps = course.steps
     if not 0 < p < len(steps) - 1 or steps[p].stance.over is not None:
         return None
-    on = search.reachability.link(steps[p - 1], steps[p + 1].table, steps[p + 1].s)
+    on = search.link(steps[p - 1], steps[p + 1].table, steps[p + 1].s)
     if on is None or (way := search.move(steps[p - 1], on)).limit:
         return None
     limits = " and ".join(limit.replace("_", " ") for at, limit in found.bad if at == p)

@@ -40,79 +40,6 @@ from biodance.records import Array
 _PARTS = 2  # Parts of the body that change at a time
 
 
-@dataclass(eq=False)
-class Reachability:
-    """The postures of one design and what follows on what, worked out once; ``can`` says whether this body can go from
-    one step to another.
-    """
-
-    work: DesignContext
-    can: Callable[[DanceStep, DanceStep], bool]
-    _tables: dict[str, PostureTable] = field(default_factory=dict)
-    _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
-    _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.words = read_vocabulary()
-
-    def table(self, stance: Stance) -> PostureTable:
-        """Return all postures on the feet ``stance``."""
-        key = stance.key
-        if key not in self._tables:
-            rng = np.random.default_rng([self.work.seed, 6])
-            chain, plan = self.work.chain, self.work.plan
-            words = words_for(chain.body, plan, stance, self.words, rng)
-            self._tables[key] = PostureTable.of(chain, stance, words)
-        return self._tables[key]
-
-    def after(self, last: DanceStep | None, table: PostureTable) -> Iterator[DanceStep]:
-        """Yield all postures of a table that may follow on the last one."""
-        if np.isinf(self.work.plan.instructions):
-            yield from (DanceStep(table, s) for s in range(len(table.index)))
-            return
-        steps = (self._called(last, table, s) for s in _near(last, table))
-        yield from (step for step in steps if step is not None)
-
-    def link(self, last: DanceStep, table: PostureTable, s: int) -> DanceStep | None:
-        """Return posture ``s`` as it follows on the last one, None if it may not."""
-        return self._called(last, table, s) if s in _near(last, table) else None
-
-    def _called(self, last: DanceStep | None, table: PostureTable, s: int) -> DanceStep | None:
-        body, most = self.work.chain.body, self.work.plan.instructions
-        if last is not None and last.table is table and s == table.mirrored[last.s]:
-            return DanceStep(table, s, MIRROR_CALL, mirror=True)
-        before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.stance)
-        said = instructions(body, before, table.x[s], feet, table.stance)
-        most += feet is None and bool(table.stance.holding)  # to take hold of the frame, before it begins
-        return DanceStep(table, s, said) if len(said) <= most else None
-
-    def leads(self, table: PostureTable, s: int, goal: PostureTable, steps: int) -> bool:
-        """Return whether posture ``s`` leads in at most so many ``steps`` to one of ``goal``, the arms at rest."""
-        return any(self._goes(int(row), table, goal) for row in self._within(table, s, steps - 1))
-
-    def _within(self, table: PostureTable, s: int, steps: int) -> NDArray[np.intp]:
-        """Return the postures that are so many ``steps`` at most from ``s``, on the same feet, the arms at rest."""
-        key = table.stance.key, int(table.arms_at_rest[s]), steps
-        if key not in self._around:
-            found = np.array([key[1]])
-            if steps:
-                rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
-                here = [DanceStep(table, int(k)) for k in near]
-                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
-            self._around[key] = found
-        return self._around[key]
-
-    def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
-        """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
-        key = table.stance.key, s, goal.stance.key
-        if key not in self._going:
-            last = DanceStep(table, s)
-            near = np.intersect1d(_near(last, goal), np.unique(goal.arms_at_rest))
-            steps = (self._called(last, goal, int(t)) for t in near)
-            self._going[key] = any(step is not None and self.can(last, step) for step in steps)
-        return self._going[key]
-
-
 def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
     was = {part: word.key for part, word in last.table.words_of(last.s).items()} if last is not None else {}
@@ -187,7 +114,7 @@ class _Place:
 @dataclass(eq=False)
 class WordSearch:
     """The search for one dance, whose postures and moves leave imprecise people ``enough`` deviations; what was worked
-    out is kept, so that another look costs little.
+    out (postures, what follows on what, moves) is kept, so that another look costs little.
     """
 
     work: DesignContext
@@ -195,14 +122,13 @@ class WordSearch:
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
     _standing: dict[str, Array] = field(default_factory=dict)
+    _tables: dict[str, PostureTable] = field(default_factory=dict)
+    _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
+    _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        plan = self.work.plan
-        self.reachability = Reachability(
-            self.work,
-            lambda last, step: not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit),
-        )
-        self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
+        self.words = read_vocabulary()
+        self.information = PostureInformation(self.work.chain, self.work.plan, centres=self.work.plan.lively)
 
     def course(self, stances: tuple[Stance, ...]) -> Course:
         """Return one step for each of ``stances`` and the moves between them.
@@ -239,8 +165,8 @@ class WordSearch:
         for number, pair in enumerate(pairwise(stances), start=1):
             if pair[0].key == pair[1].key:
                 continue
-            was, now = (self.reachability.table(stance) for stance in pair)
-            if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
+            was, now = (self.table(stance) for stance in pair)
+            if not any(self.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
 
@@ -289,7 +215,7 @@ class WordSearch:
 
     def _stuck(self, stances: tuple[Stance, ...], number: int, why: dict[str, int]) -> NoNextPosture:
         """Return why there is no posture in place ``number``, of the limits that others broke counted in ``why``."""
-        table, plan = self.reachability.table(stances[number]), self.work.plan
+        table, plan = self.table(stances[number]), self.work.plan
         if number == 0 or not why:
             return NoNextPosture(nearest_in_words(table, plan.limits), stances, number)
         most = max(why, key=lambda name: why[name]).replace("_", " ")
@@ -299,10 +225,10 @@ class WordSearch:
 
     def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[DanceStep]:
         """Yield the postures within reach on the next feet, the best first."""
-        stance, table = stances[len(steps)], self.reachability.table(stances[len(steps)])
+        stance, table = stances[len(steps)], self.table(stances[len(steps)])
         last = steps[-1] if steps else None
         used, late = {step.s for step in steps if step.table is table}, self._late(len(steps), stances)
-        found = [step for step in self.reachability.after(last, table) if step.s not in used]
+        found = [step for step in self.after(last, table) if step.s not in used]
         if not found:
             return
         if stance.over is not None:
@@ -324,8 +250,8 @@ class WordSearch:
         left = next((k for k, one in enumerate(stances[number:]) if one.key != feet), 0)
         if not left or np.isinf(self.work.plan.instructions):
             return lambda step: False
-        goal = self.reachability.table(stances[number + left])
-        return lambda step: not self.reachability.leads(step.table, step.s, goal, left)
+        goal = self.table(stances[number + left])
+        return lambda step: not self.leads(step.table, step.s, goal, left)
 
     def _seconds(self, steps: list[DanceStep]) -> Array:
         """Return what each step costs, s."""
@@ -338,6 +264,67 @@ class WordSearch:
             found, limit = step.table.keeps(step.s, self.work.plan.limits)
             self._held[step.key] = found, limit if found < self.enough else ""
         return self._held[step.key]
+
+    def table(self, stance: Stance) -> PostureTable:
+        """Return all postures on the feet ``stance``."""
+        key = stance.key
+        if key not in self._tables:
+            rng = np.random.default_rng([self.work.seed, 6])
+            chain, plan = self.work.chain, self.work.plan
+            words = words_for(chain.body, plan, stance, self.words, rng)
+            self._tables[key] = PostureTable.of(chain, stance, words)
+        return self._tables[key]
+
+    def after(self, last: DanceStep | None, table: PostureTable) -> Iterator[DanceStep]:
+        """Yield all postures of a table that may follow on the last one."""
+        if np.isinf(self.work.plan.instructions):
+            yield from (DanceStep(table, s) for s in range(len(table.index)))
+            return
+        steps = (self._called(last, table, s) for s in _near(last, table))
+        yield from (step for step in steps if step is not None)
+
+    def link(self, last: DanceStep, table: PostureTable, s: int) -> DanceStep | None:
+        """Return posture ``s`` as it follows on the last one, None if it may not."""
+        return self._called(last, table, s) if s in _near(last, table) else None
+
+    def _called(self, last: DanceStep | None, table: PostureTable, s: int) -> DanceStep | None:
+        body, most = self.work.chain.body, self.work.plan.instructions
+        if last is not None and last.table is table and s == table.mirrored[last.s]:
+            return DanceStep(table, s, MIRROR_CALL, mirror=True)
+        before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.stance)
+        said = instructions(body, before, table.x[s], feet, table.stance)
+        most += feet is None and bool(table.stance.holding)  # to take hold of the frame, before it begins
+        return DanceStep(table, s, said) if len(said) <= most else None
+
+    def leads(self, table: PostureTable, s: int, goal: PostureTable, steps: int) -> bool:
+        """Return whether posture ``s`` leads in at most so many ``steps`` to one of ``goal``, the arms at rest."""
+        return any(self._goes(int(row), table, goal) for row in self._within(table, s, steps - 1))
+
+    def _within(self, table: PostureTable, s: int, steps: int) -> NDArray[np.intp]:
+        """Return the postures that are so many ``steps`` at most from ``s``, on the same feet, the arms at rest."""
+        key = table.stance.key, int(table.arms_at_rest[s]), steps
+        if key not in self._around:
+            found = np.array([key[1]])
+            if steps:
+                rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
+                here = [DanceStep(table, int(k)) for k in near]
+                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
+            self._around[key] = found
+        return self._around[key]
+
+    def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
+        """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
+        key = table.stance.key, s, goal.stance.key
+        if key not in self._going:
+            last = DanceStep(table, s)
+            near = np.intersect1d(_near(last, goal), np.unique(goal.arms_at_rest))
+            steps = (self._called(last, goal, int(t)) for t in near)
+            self._going[key] = any(step is not None and self.can(last, step) for step in steps)
+        return self._going[key]
+
+    def can(self, last: DanceStep, step: DanceStep) -> bool:
+        """Return whether this body can go from one step to another, as imprecisely as people do."""
+        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
 
     def move(self, last: DanceStep, step: DanceStep) -> Move:
         """Return the move from one step to the next, as `straight_move` finds it."""
@@ -389,9 +376,9 @@ def word_course(search: WordSearch) -> Course:
             notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
         else:
-            notes += words_left_out(body, plan, course.stances, search.reachability.words)
+            notes += words_left_out(body, plan, course.stances, search.words)
             if plan.careful:  # the words that a person with own limits can do on none of the feet
-                tables = {one.key: search.reachability.table(one) for one in course.stances if one.over is None}
+                tables = {one.key: search.table(one) for one in course.stances if one.over is None}
                 notes += (said for one in tables.values() for said in words_never_kept(one, plan.limits))
             return replace(course, notes=tuple(dict.fromkeys(notes)))
 
