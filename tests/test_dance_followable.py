@@ -13,7 +13,7 @@ from biodance.dance import design
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.limits import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import Imprecision, PerformersMargin, PerformersResult, PlannedDance, try_performers
+from biodance.dance.performers import Imprecision, PerformersResult, PlannedDance, try_performers
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
@@ -21,8 +21,8 @@ from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_bod
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.search.course import Checkpoint, DesignContext
 from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
-from biodance.dance.search.word_course import NoNextPosture, Reachability, WordSearch
-from biodance.dance.verify import broken, verify
+from biodance.dance.search.word_course import NoNextPosture, WordSearch
+from biodance.dance.verify import Margin, broken, verify
 from biodance.motion.kinematics import poses
 from biodance.report.dance import mannequin_svg
 
@@ -44,7 +44,8 @@ def test_a_dance_asks_little_at_once_and_keeps_all_limits(searched) -> None:
     search, course = searched
     dance, steps = course.dance(search.work), course.steps
     for before, after in pairwise(steps):
-        changed = [part for part, word in after.words.items() if word.key != before.words[part].key]
+        was, now = (one.table.words_of(one.s) for one in (before, after))
+        changed = [part for part, word in now.items() if word.key != was[part].key]
         assert after.mirror or 1 <= len(changed) <= 2
     said = dance_instructions(dance)
     assert max(map(len, said)) <= 3
@@ -58,7 +59,7 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(searche
 
     def performed(dance, _limits, *, who=range(200), only=(), workers):
         bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
-        room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
+        room = Margin("self_collision_of_performers", -0.01 if bad else 0.01, 0.0, "m", "arm - head")
         return PerformersResult(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
     monkeypatch.setattr(design, "try_performers", performed)
@@ -72,17 +73,19 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(searche
     assert not broken(verify(BODY, dance, PLAN.limits))
 
 
-def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched) -> None:
+def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched, monkeypatch) -> None:
     search, _ = searched
     both, over, *_ = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1))))
-    stand, shift = (search.reachability.table(feet) for feet in (both, over))
+    stand, shift = (search.table(feet) for feet in (both, over))
     work = replace(search.work, plan=replace(PLAN, instructions=2.0))
-    reach, all_ = Reachability(work, lambda *_: True), range(len(stand.index))
+    reach, all_ = WordSearch(work), range(len(stand.index))
+    monkeypatch.setattr(WordSearch, "can", lambda *_: True)
     left = [next(n for n in (1, 2, 3) if reach.leads(stand, s, shift, n)) for s in all_]
     words = [stand.words_of(s) for s in all_]
     assert {n for n, word in zip(left, words, strict=True) if word["trunk"].rest and word["legs"].rest} == {1}
     assert {n for n, word in zip(left, words, strict=True) if not word["trunk"].rest and not word["legs"].rest} == {2}
-    barred = Reachability(work, lambda *_: False)
+    monkeypatch.setattr(WordSearch, "can", lambda *_: False)
+    barred = WordSearch(work)
     assert not any(barred.leads(stand, s, shift, n) for s in all_ for n in (1, 3))
 
 
@@ -156,9 +159,14 @@ def test_an_exact_performer_does_the_dance_itself() -> None:
     found = try_performers(small_dance(), PLAN.limits, who=(0,), how=exact)
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
-    assert found["self_collision"].worst == pytest.approx(gap.min(), abs=2e-3)
-    bad = try_performers(small_dance(), PLAN.limits, who=range(3))
-    assert all(bad[name].worst < found[name].worst for name in ("self_collision", "balance"))
+    least = next(one for one in PLAN.limits if one.name == "self_collision").for_imprecise().least
+    left, less = worst_of(found), worst_of(try_performers(small_dance(), PLAN.limits, who=range(3)))
+    assert left["self_collision_of_performers"] == pytest.approx(gap.min() - least, abs=2e-3)
+    assert all(less[f"{name}_of_performers"] < left[f"{name}_of_performers"] for name in ("self_collision", "balance"))
+
+
+def worst_of(found: PerformersResult) -> dict[str, float]:
+    return {margin.limit: margin.worst for margin in found.margins}
 
 
 def test_performers_are_the_same_in_groups() -> None:
@@ -173,9 +181,8 @@ def test_performers_looked_at_together_are_those_looked_at_alone() -> None:
     together = try_performers(dance, PLAN.limits, who=range(3), only=(1, 2))
     assert set(together.bad) == {bad for one in alone for bad in one.bad}
     assert together.failed == tuple(k for one in alone for k in one.failed)
-    for room in together.least_margins:
-        assert room.worst == pytest.approx(min(one[room.limit].worst for one in alone), abs=1e-12)
-        assert room.failing == pytest.approx(np.mean([one[room.limit].failing for one in alone]))
+    for limit, worst in worst_of(together).items():
+        assert worst == pytest.approx(min(worst_of(one)[limit] for one in alone), abs=1e-12)
 
 
 def test_a_part_of_the_plan_is_that_of_the_whole_plan() -> None:

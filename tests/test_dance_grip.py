@@ -108,7 +108,7 @@ def test_every_known_posture_holds_the_frame_and_nobody_is_told_to_move_that_arm
     plan = replace(read_plan("patient"), blocks=(("parallel", 4),), holds=("right",))
     search = WordSearch(DesignContext.alone(BODY, plan, 0))
     (stance, *_) = support_sequence(BODY, plan)
-    table = search.reachability.table(stance)
+    table = search.table(stance)
     assert [word.key for word in table.words["right_arm"]] == ["hold"]
     upright = np.flatnonzero(table.index[:, table.parts.index("legs")] == 0)
     held = State(CHAIN, stance, table.x[upright], *np.zeros((2, len(upright), CHAIN.size)))

@@ -85,7 +85,7 @@ def test_slopes_equal_differences(limit: Limit, where: Stance) -> None:
     built, y, _ = problem(where, (limit,), nothing)
     point = built.evaluate(y)
     near = np.flatnonzero(point.margins < FAR)
-    _, slopes = point.slopes(near)
+    slopes = point.jacobian(near)
     assert slopes.shape == (len(near), len(y))
     expected = differences(built.evaluate, y, lambda p: p.margins)[near]
     np.testing.assert_allclose(slopes, expected.reshape(slopes.shape), atol=3e-6 * (1 + np.abs(slopes).max(initial=0)))
@@ -144,7 +144,7 @@ def test_slopes_of_the_dynamic_criterion(planted):
 
     built, y, _ = problem(standing_on(planted), (), objective)
     expected = differences(built.evaluate, y, lambda p: p.value)
-    got, _ = built.evaluate(y).slopes(np.arange(0))
+    got = built.evaluate(y).gradient
     np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
 
 
@@ -153,7 +153,7 @@ def test_slopes_of_the_static_criterion():
     others = static_grams(up / np.linalg.norm(up, axis=2, keepdims=True))
     built, y, _ = problem(standing_on((0, 1)), (), Exciting(BLOCKS, others, 1.0, 8), frames=1, still=True)
     expected = differences(built.evaluate, y, lambda p: p.value)
-    got, _ = built.evaluate(y).slopes(np.arange(0))
+    got = built.evaluate(y).gradient
     np.testing.assert_allclose(got, expected, atol=1e-5 * np.abs(expected).max())
 
 

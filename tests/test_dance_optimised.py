@@ -9,16 +9,11 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
+from biodance.dance.expectation import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
 from biodance.dance.limits import family
+from biodance.dance.limits.ground_clearance import GroundClearance
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import (
-    SAMPLE_ERROR,
-    SAMPLE_RATE,
-    PostureInformation,
-    excitation_blocks,
-    learned,
-    update_posterior,
-)
+from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.plan import Plan
@@ -27,7 +22,8 @@ from biodance.dance.problem.stance import feet_in_move, stance
 from biodance.dance.search import course as course_module
 from biodance.dance.search import move as move_module
 from biodance.dance.search import optimised_course
-from biodance.dance.search.course import Checkpoint, Course, DesignContext, PlainStep
+from biodance.dance.search.course import Checkpoint, Course, DanceStep, DesignContext
+from biodance.dance.search.known_postures import PostureTable
 from biodance.dance.search.move import Move, Task
 from biodance.dance.search.optimised_course import affordable, feasible_course, nearest_neighbours
 from biodance.dance.search.postures import KEPT, alike, initial_guess, solve
@@ -149,7 +145,7 @@ TWO_FEET = Plan("small", "", (("parallel", 4),), hold=1.0)
 def course():
     rng, stances = np.random.default_rng(3), support_sequence(WOMAN, TWO_FEET)
     found = [solve(WOMANS, s, initial_guess(WOMANS, s, rng), no_objective, family(), iterations=30) for s in stances]
-    steps = tuple(PlainStep(one.x, s) for one, s in zip(found, stances, strict=True))
+    steps = tuple(DanceStep(PostureTable(CHAIN, s, one.x[None])) for one, s in zip(found, stances, strict=True))
     return Course(steps, (None,) * (len(steps) - 1))
 
 
@@ -254,6 +250,17 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
     move = move_module.exciting_move(task, np.zeros((12, 6, 6)), [1, 3, 0])
     assert (move.limit == "") is taken
     assert (tried == [2.0]) is taken
+
+
+def test_a_foot_on_its_way_is_designed_five_centimetres_over_the_floor_half_way() -> None:
+    """Lower, it drags, and whoever is played in MuJoCo falls over it; at both ends it stands."""
+    feet, limit, time = stance(BODY, "parallel").on(1), GroundClearance(), np.linspace(0.0, 2.0, 5)
+    task = Task(CHAIN, excitation_blocks(BODY), feet, np.zeros((2, CHAIN.size)), 2.0, (limit,))
+    asked = task.problem(task.straight(), [], time, reserve=move_module.RESERVE, objective=no_objective).reserve
+    height = limit.scale * asked[:, 0]
+    np.testing.assert_allclose(height[[0, 2, 4]], [0.0, 0.05, 0.0], atol=1e-12)
+    assert height[1] == pytest.approx(height[3])
+    assert 0.01 < height[1] < 0.05
 
 
 def test_parts_of_older_code_are_not_gone_on_with(tmp_path, monkeypatch):

@@ -97,6 +97,15 @@ def test_the_feet_of_who_stands_upright_bear_half_each() -> None:
     np.testing.assert_allclose(LOAD.margins(still()).value[0], [0.05 * weight, 0.2 * weight], atol=1e-6)
 
 
+def test_a_foot_that_may_bear_all_may_bear_all_alone_and_with_the_reserve_of_a_posture() -> None:
+    upright, limit = still(), FootLoad(left=0.7)
+    alone = State(CHAIN, upright.stance.on(0), upright.x, upright.v, upright.a)
+    value = limit.margins(alone).value
+    assert value.shape == (1, 1), "of the left foot only"
+    assert value.min() > limit.hold_reserve(alone.stance) * limit.scale
+    assert FootLoad().margins(alone).value.size == 0
+
+
 # ---- the words of the file
 
 

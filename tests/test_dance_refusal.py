@@ -13,15 +13,17 @@ from biodance.body.human.skeleton import joint_limits
 from biodance.dance.design import safe_stretch
 from biodance.dance.limits import family
 from biodance.dance.performers import PerformersResult
-from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
+from biodance.dance.problem.state import State
 from biodance.dance.search import word_course as word_search
-from biodance.dance.search.course import Course, DesignContext, PlainStep
-from biodance.dance.search.postures import KEPT, initial_guess, refuse, solve
+from biodance.dance.search.course import Course, DanceStep, DesignContext
+from biodance.dance.search.known_postures import PostureTable
+from biodance.dance.search.postures import KEPT, describe, initial_guess, refuse, solve
 from biodance.dance.search.word_course import NoNextPosture, WordSearch, word_course
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -71,6 +73,16 @@ def test_an_ankle_that_stays_pointed_cannot_stand() -> None:
     assert "ankle dorsiflexion (short by about" in said
 
 
+def test_a_posture_at_its_limit_lacks_the_reserve_and_not_minus_nothing() -> None:
+    chain, ends, knee = Chain(BODY), BODY.limits, BODY.joint_index("left_knee_flexion")
+    x = np.zeros((1, chain.size))
+    x[0, ROOT:] = (ends.lower + ends.upper) / 2
+    x[0, ROOT + knee] = ends.upper[knee]
+    limit = next(one for one in family() if one.name == "joint_range")
+    said = describe(State(chain, FEET, x, *np.zeros((2, 1, chain.size))), limit)
+    assert said == "joint range of left knee flexion (0 degrees left, less than its reserve)"
+
+
 # ---- known postures: what is not possible is left out, the rest is danced
 
 PLAN = Plan("p", "", (("parallel", 4), ("single_right", 2)), hold=1.0, instructions=3.0, wide=1.35, gentle=True)
@@ -108,7 +120,7 @@ def test_only_where_nothing_is_left_a_dance_is_refused_with_joint_and_number() -
 
 @pytest.mark.parametrize(("bad", "kept"), [((4,), (5, 9)), ((0, 8), (1, 7)), ((1, 3, 5, 7, 9), None)])
 def test_the_longest_stretch_at_which_nobody_errs_is_left(bad: tuple[int, ...], kept: tuple[int, int] | None) -> None:
-    steps = tuple(PlainStep(np.full(3, float(p)), FEET, mirror=True) for p in range(10))
+    steps = tuple(DanceStep(PostureTable(Chain(BODY), FEET, np.full((1, 3), float(p))), mirror=True) for p in range(10))
     found = PerformersResult(1, (), tuple((p, "balance") for p in bad))
     shorter = safe_stretch(Course(steps, (None,) * 9), found)
     if kept is None:
@@ -123,7 +135,7 @@ def test_the_longest_stretch_at_which_nobody_errs_is_left(bad: tuple[int, ...], 
 
 def test_a_stretch_begins_and_ends_on_both_feet() -> None:
     feet = (FEET, FEET, replace(FEET, over=0), FEET.on(0), FEET.on(0), replace(FEET, over=0), FEET, FEET)
-    steps = tuple(PlainStep(np.full(3, float(p)), one) for p, one in enumerate(feet))
+    steps = tuple(DanceStep(PostureTable(Chain(BODY), one, np.full((1, 3), float(p)))) for p, one in enumerate(feet))
     shorter = safe_stretch(Course(steps, (None,) * 7), PerformersResult(1, (), ((0, "balance"), (4, "balance"))))
     assert shorter is not None
     assert [int(step.x[0]) for step in shorter.steps] == [6, 7]

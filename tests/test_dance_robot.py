@@ -18,6 +18,7 @@ from biodance.body.similarity import hoap3, standing_frames
 from biodance.body.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
+from biodance.dance.expectation import ROBOT_ERROR, ROBOT_RATE
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
@@ -27,7 +28,7 @@ from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of
 from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
-from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, person_sized_plan, robot_plan
+from biodance.dance.robot import leg_length, person_sized, person_sized_plan, robot_plan
 from biodance.dance.search.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
@@ -213,13 +214,13 @@ def test_the_table_of_angles_is_the_dance(made: tuple[Path, int]) -> None:
 def test_parameters_come_back_from_the_wrench_of_the_dance(made: tuple[Path, int]) -> None:
     place, _ = made
     dance, rng = Dance.load(place / "out" / "dance.npz"), np.random.default_rng(4)
-    body, motion = dance.body, dance.motion(_RATE)
+    body, motion = dance.body, dance.motion(ROBOT_RATE)
     truth = body.sip.phi * rng.uniform(0.8, 1.2, len(body.segments)).repeat(10)
     exact = regressor(body, motion) @ truth
     np.testing.assert_allclose(exact, predict_wrench(body, motion, truth).value, atol=1e-12)
-    noisy = exact + ERROR * rng.normal(size=exact.shape)
+    noisy = exact + ROBOT_ERROR * rng.normal(size=exact.shape)
     base = structural_base(body)
-    noise = Noise(np.diag(ERROR**2)[None], np.zeros(3))
+    noise = Noise(np.diag(ROBOT_ERROR**2)[None], np.zeros(3))
     estimate = estimate_base(information(body, motion, Wrench(motion.time, noisy), noise), base)
     known = np.isfinite(estimate.sd)
     assert known.sum() > 80

@@ -11,8 +11,9 @@ from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import expect
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
+from biodance.dance.limits.balance import Balance
 from biodance.dance.limits.joint_range import JointRange
-from biodance.dance.performers import PerformersMargin, PerformersResult
+from biodance.dance.performers import Imprecision, try_performers
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import Phase, basis_at, rest_to_rest
 from biodance.dance.problem.state import State
@@ -228,10 +229,13 @@ def test_a_safe_dance_says_nothing(result: DanceResult, tmp_path: Path) -> None:
 
 
 def test_what_performers_lack_becomes_what_is_not_safe() -> None:
-    """3 mm of support of the 15 that are asked, and segments that keep 21 mm of 20."""
-    rooms = (
-        PerformersMargin("balance", "m", 0.015, 0.003, 1, "parallel", 0.01),
-        PerformersMargin("self_collision", "m", 0.02, 0.021, 1, "arm - head", 0.0),
-    )
-    margins = PerformersResult(200, rooms, ((1, "balance"),)).margins(small_dance())
-    assert [round(margin.worst, 6) for margin in margins] == [-0.012, 0.001]
+    """As much less is left as more is asked; less than nothing is not safe, and where it is, is said."""
+    swaying, limits = Imprecision(sway=0.02), ((Balance(room=room),) for room in (0.015, 0.1))
+    usual, strict = (try_performers(small_dance(), some, who=range(3), how=swaying) for some in limits)
+    (left,), (lacking,) = usual.margins, strict.margins
+    assert left.limit == lacking.limit == "balance_of_performers"
+    assert left.worst - lacking.worst == pytest.approx(0.085, abs=1e-12)
+    assert (usual.safe, broken(usual.margins)) == (True, ())
+    assert (strict.safe, broken(strict.margins)) == (False, (lacking,))
+    assert (lacking.what, lacking.unit, lacking.where_s) == ("parallel", "m", 1.0)
+    assert (strict.bad, strict.failed) == (((1, "balance"),), (1, 2))

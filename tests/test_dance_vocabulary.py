@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from small_dances import BODY, small_dance
 
+from biodance.dance.expectation import CENTRES, rows_of_centres
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import CENTRES, rows_of_centres
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import Stance

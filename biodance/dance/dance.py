@@ -4,7 +4,7 @@ nothing is believed that is out of range. Planted legs are not written but solve
 
 import json
 import zlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -19,7 +19,7 @@ from biodance.body.body import Body, body_text, parse_body
 from biodance.dance.limits import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import Phase, path_in, phase_at
-from biodance.dance.problem.stance import Stance, stance_fields
+from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import whole_file
@@ -94,6 +94,12 @@ class DanceWords(_Entry):
     rest: float | None = Field(None, gt=0, allow_inf_nan=False)
     stances: list[StanceWords] = Field(max_length=MOST_POSTURES)
     under: list[StanceWords] = Field(max_length=MOST_POSTURES)
+
+
+def _stance_words(stance: Stance) -> dict[str, Any]:
+    """Return a stance in words that JSON knows."""
+    found = {one.name: getattr(stance, one.name) for one in fields(stance)}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
 
 
 _ARRAYS = ("postures", "hold", "via", "move")
@@ -333,7 +339,7 @@ class Dance(Sendable):
         words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
         words |= {"care": self.care, "rest": self.rest}
         words["unsafe"] = [asdict(margin) for margin in self.unsafe]
-        words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
+        words |= {"stances": [_stance_words(s) for s in self.stances], "under": [_stance_words(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {"words": json.dumps(words), "body": body_text(self.body, self.protocol)}
         with whole_file(Path(path), over=True) as part, part.open("wb") as stream:

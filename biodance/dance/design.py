@@ -15,12 +15,12 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import ArmLift
-from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
+from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, PerformersResult, try_performers
 from biodance.dance.problem.plan import Plan
-from biodance.dance.search.course import Checkpoint, Course, DesignContext, Tell
+from biodance.dance.search.course import Checkpoint, Course, DanceStep, DesignContext, Tell
 from biodance.dance.search.move import AMPLE, ENOUGH, other_moves
 from biodance.dance.search.optimised_course import optimised_course
-from biodance.dance.search.word_course import LEAST, NoNextPosture, WordSearch, WordStep, word_course
+from biodance.dance.search.word_course import LEAST, NoNextPosture, WordSearch, word_course
 from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
@@ -31,10 +31,10 @@ _FEW = 40  # Performers of a first look
 
 _MUCH = 1 / 3  # Share of the plan's postures with which nothing longer is looked for
 
-_Other = tuple[Course[WordStep], tuple[int, ...]]  # A course, and the postures where it differs
+_Other = tuple[Course, tuple[int, ...]]  # A course, and the postures where it differs
 
 
-def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:
+def safe_course(work: DesignContext) -> tuple[Course, PerformersResult]:
     """Return a course as all performers can dance it, and what they leave of the limits.
 
     People who tire (a gentle plan) or whose arms stay near the body are first asked only for what leaves imprecise
@@ -47,7 +47,7 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
     NoNextPosture
         There is no course.
     """
-    found, missing = list[tuple[Course[WordStep], PerformersResult]](), list[NoNextPosture]()
+    found, missing = list[tuple[Course, PerformersResult]](), list[NoNextPosture]()
     plan = work.plan
     near = plan.holds or plan.hanging or any(isinstance(limit, ArmLift) for limit in plan.limits)
     for enough in (AMPLE, ENOUGH) if plan.gentle or near else (ENOUGH, AMPLE):
@@ -67,7 +67,7 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
     return found[0] if shorter is None else repaired_course(WordSearch(work), shorter, work.workers)
 
 
-def safe_stretch(course: Course[WordStep], found: PerformersResult) -> Course[WordStep] | None:
+def safe_stretch(course: Course, found: PerformersResult) -> Course | None:
     """Return the longest part of a course at no posture of which somebody came too near a limit, from both feet to both
     feet; None where not even two postures follow on each other.
     """
@@ -90,9 +90,7 @@ def safe_stretch(course: Course[WordStep], found: PerformersResult) -> Course[Wo
     return Course(steps, course.moves[first:last], (*course.notes, note))
 
 
-def repaired_course(
-    search: WordSearch, course: Course[WordStep], workers: Executor
-) -> tuple[Course[WordStep], PerformersResult]:
+def repaired_course(search: WordSearch, course: Course, workers: Executor) -> tuple[Course, PerformersResult]:
     """Return the course as all performers can dance it, and what they leave of the limits; if it could not be repaired,
     as well as it could be.
     """
@@ -107,9 +105,7 @@ def repaired_course(
     return danced, found
 
 
-def _repaired_at(
-    search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult, workers: Executor
-) -> Course[WordStep]:
+def _repaired_at(search: WordSearch, course: Course, p: int, found: PerformersResult, workers: Executor) -> Course:
     """Return the course with another move to posture ``p`` or another posture there that is safe or nearest to it."""
     best, most = course, _room(search, course, (p,), found.failed, workers)
     for other, only in _others(search, course, p, found):
@@ -122,23 +118,23 @@ def _repaired_at(
 
 
 def _room(
-    search: WordSearch, course: Course[WordStep], only: tuple[int, ...], first: tuple[int, ...], workers: Executor
+    search: WordSearch, course: Course, only: tuple[int, ...], first: tuple[int, ...], workers: Executor
 ) -> float:
     """Return how far the worst performer stays from what is demanded to and in the postures ``only``, in scales of the
     limits; those who came too near before dance ``first``, the others only if these have room.
     """
     limits, dance, room = search.work.plan.limits, course.dance(search.work), float("inf")
-    scale = {limit.name: limit.scale for limit in limits}
+    scale = {f"{limit.name}_{OF_PERFORMERS}": limit.scale for limit in limits}
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
     for who in (first, others[:_FEW], others[_FEW:]):
         found = try_performers(dance, limits, who=who, only=only, workers=workers)
-        room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
+        room = min(room, *(one.worst / scale[one.limit] for one in found.margins))
         if room < 0:
             break
     return room
 
 
-def _others(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Iterator[_Other]:
+def _others(search: WordSearch, course: Course, p: int, found: PerformersResult) -> Iterator[_Other]:
     """Yield what else may be done at posture ``p`` or just before, what changes least first: another move of the same
     time, another posture, a slower move, another posture before, none at all.
     """
@@ -153,7 +149,7 @@ def _others(search: WordSearch, course: Course[WordStep], p: int, found: Perform
         yield without, (p,)
 
 
-def _by_other_moves(search: WordSearch, course: Course[WordStep], p: int, *, slower: bool) -> Iterator[_Other]:
+def _by_other_moves(search: WordSearch, course: Course, p: int, *, slower: bool) -> Iterator[_Other]:
     """Yield courses with another move to posture ``p``."""
     last = course.moves[p - 1] if p else None
     if last is not None:
@@ -161,17 +157,17 @@ def _by_other_moves(search: WordSearch, course: Course[WordStep], p: int, *, slo
             yield course.spliced(p, p, (), (move,)), (p,)
 
 
-def _exchanged(search: WordSearch, course: Course[WordStep], q: int) -> Iterator[Course[WordStep]]:
+def _exchanged(search: WordSearch, course: Course, q: int) -> Iterator[Course]:
     """Yield courses with another posture in place ``q``, the best first."""
     before, after = [*course.steps[:q]], next(iter(course.steps[q + 1 :]), None)
     posterior, taken = search.information.beforehand, {step.key for step in course.steps}
     for number, step in enumerate(before):
         posterior = search.posterior_after(posterior, before[:number], step)
 
-    def on_from(step: WordStep) -> WordStep | None:
-        return None if after is None else search.reachability.link(step, after.table, after.s)
+    def on_from(step: DanceStep) -> DanceStep | None:
+        return None if after is None else search.link(step, after.table, after.s)
 
-    def fits(step: WordStep) -> bool:
+    def fits(step: DanceStep) -> bool:
         return step.key not in taken and (after is None or on_from(step) is not None)
 
     for step, move in search.possible(before, course.stances, posterior, {}, wanted=fits):
@@ -182,12 +178,12 @@ def _exchanged(search: WordSearch, course: Course[WordStep], q: int) -> Iterator
             yield course.spliced(q, q + 2, (step, on), (*to, way, *course.moves[q + 1 : q + 2]))
 
 
-def _without(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Course[WordStep] | None:
+def _without(search: WordSearch, course: Course, p: int, found: PerformersResult) -> Course | None:
     """Return the course without posture ``p``, None where its neighbours need it."""
     steps = course.steps
     if not 0 < p < len(steps) - 1 or steps[p].stance.over is not None:
         return None
-    on = search.reachability.link(steps[p - 1], steps[p + 1].table, steps[p + 1].s)
+    on = search.link(steps[p - 1], steps[p + 1].table, steps[p + 1].s)
     if on is None or (way := search.move(steps[p - 1], on)).limit:
         return None
     limits = " and ".join(limit.replace("_", " ") for at, limit in found.bad if at == p)
@@ -232,9 +228,8 @@ def design(
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
         course, found = safe_course(work)
-        dance = course.dance(work)
-        danced = found.margins(dance)
-        dance = replace(dance, unsafe=broken(danced))
+        danced = found.margins
+        dance = replace(course.dance(work), unsafe=broken(danced))
     else:
         dance = optimised_course(work).dance(work)
     work.tell("checking every limit", 0, 0)

@@ -1,13 +1,20 @@
 """What a movement tells of every segment: what will be known after a planned dance, how that grows with its duration,
-how well a dance was danced, and which transitions are worth dancing once more.
+how well a dance was danced, which transitions are worth dancing once more, and which posture to choose next.
 
 The same machinery as identification: information of the whitened regressor, discounted by what twins of the person
 (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of the table. Only the
-noise is not the session's own but that of virtual dances, so that planned and performed motion are judged alike.
+noise is not the session's own but that of virtual dances, so that planned and performed motion are judged alike. A
+robot has encoders and no skin: nothing disturbs it but the noise that its own wrench had.
 
 `MovementInformation` judges posture by posture and move by move, so that a page can add up while somebody dances. A
 posture that is held tells by weight alone: the vertical force, and its moments about the horizontal axes. A move tells
 by its accelerations, too. What disturbs a session beyond the noise is left out; only a share of the information counts.
+
+`PostureInformation` judges candidates while a dance is designed, thousands a second: rows of the regressor per standard
+deviation of the error and of the table. With ``centres`` postures also tell of the centres of the ball joints, which
+identification finds from the movement. A centre lies at c in the frame of the one segment and at d in that of the
+other: c = R d + their distance, with R the rotation between them. Every posture is one such equation, and only postures
+that differ tell both apart.
 """
 
 from dataclasses import dataclass, replace
@@ -17,20 +24,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.visit_log import VisitLog
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identification.posterior import BodyPosterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior, prior_factor
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
-from biodance.motion.dynamics import predict_wrench
-from biodance.records import Array, Motion, Wrench
+from biodance.motion.dynamics import predict_wrench, regressor
+from biodance.motion.kinematics import poses
+from biodance.records import Array, Motion, Sip, Wrench
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened_prior
@@ -42,6 +54,11 @@ _STILL = 1.5
 """s of every hold that count: the noise is so slow that longer standing tells next to nothing
 (docs/benchmarks/dance.md), and it would cost time.
 """
+ROBOT_ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
+"""N, N·m: error of one sample of a robot's wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table
+II)."""
+ROBOT_RATE = 4.0
+"""Hz: independent samples of the wrench of a robot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,53 +119,67 @@ class MovementEvidence:
         a, b = self.disturbed, other.disturbed
         return MovementEvidence(self.body, self.H + other.H, Mismatch(a.kinematics + b.kinematics, a.plates + b.plates))
 
-    def posterior(self) -> BodyPosterior:
-        """Return the posterior after data that agree with the table."""
-        prior = widened_prior(self.body.sip)
+    def posterior(self, prior: Sip | None = None) -> BodyPosterior:
+        """Return the posterior after data that agree with the table; ``prior`` by default with its caution."""
+        prior = prior or widened_prior(self.body.sip)
         expected = np.column_stack([np.eye(prior.phi.size), prior.phi])  # [W y] = W [1 phi]
         # [1 phi]'H [1 phi]: the data agree with the table, y = W phi.
         data = Information.of_normal(expected.T @ self.H @ expected, 1)
-        return find_posterior(temper(data, self.disturbed, typical_sizes()) if self.H.any() else data, prior)
+        scores = self.disturbed.kinematics.any() or self.disturbed.plates.any()
+        return find_posterior(temper(data, self.disturbed, typical_sizes()) if scores else data, prior)
 
 
 def movement_evidence(
-    body: Body, motion: Motion, use: NDArray[np.bool_] | None = None, *, noise: Noise
+    body: Body, motion: Motion, use: NDArray[np.bool_] | None = None, *, noise: Noise, robot: bool = False
 ) -> MovementEvidence:
-    """Return what a ``motion`` of ``body`` tells at its frames ``use`` (T,), judged at 12.5 Hz under ``noise``."""
-    step = max(1, round(motion.rate / JUDGED_RATE))
+    """Return what a ``motion`` of ``body`` tells at its frames ``use`` (T,), judged at 12.5 Hz under ``noise``; of a
+    ``robot`` at all of its samples, and undisturbed.
+    """
+    step = 1 if robot else max(1, round(motion.rate / JUDGED_RATE))
     few = Motion(motion.time[::step], motion.q[::step], motion.v[::step], motion.a[::step])
     used = np.ones(few.time.size, dtype=bool) if use is None else use[::step]
     fit = Fit("movement", few, predict_wrench(body, few), used)
     # Upper triangle R of the whitened regressor, R'R its information.
     triangle = statistics(body, fit, noise).information(noise).triangle
-    return MovementEvidence(body, triangle.T @ triangle, mismatch(body, (fit,), noise))
+    size = len(triangle)
+    scores = Mismatch(*np.zeros((2, size, 1))) if robot else mismatch(body, (fit,), noise)
+    return MovementEvidence(body, triangle.T @ triangle, scores)
+
+
+def _robot_noise() -> Noise:
+    """Return the noise of a robot's wrench: one band, the same error at all frequencies."""
+    return Noise(np.diag(ROBOT_ERROR**2)[None], np.zeros(3))
 
 
 @one_thread()
 def expect(dance: Dance, *, steps: int = 10) -> Expectation:
-    """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures."""
-    brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
-    chosen = evenly_spread(brief, steps)
-    found = expected_spread(brief.body, brief.motion(JUDGED_RATE), np.array([brief.phases[k].end for k in chosen]))
+    """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures; of a robot if it
+    is danced exactly.
+    """
+    robot = not dance.body.markers.names
+    brief = dance if robot else replace(dance, hold=np.minimum(dance.hold, _STILL))
+    holds = [k for k, phase in enumerate(dance.phases) if phase.kind == "hold"]
+    # The holds after whose ends it is told, the last one included.
+    chosen = [holds[k] for k in sorted({int(k) for k in np.linspace(0, len(holds) - 1, steps + 1).round()[1:]})]
+    ends, motion = np.array([brief.phases[k].end for k in chosen]), brief.motion(ROBOT_RATE if robot else JUDGED_RATE)
+    found = expected_spread(brief.body, motion, ends, robot=robot)
     return replace(found, duration=np.array([0.0, *(dance.phases[k].end for k in chosen)]))
 
 
-def evenly_spread(dance: Dance, steps: int) -> list[int]:
-    """Return the phases after whose ends it is told what is expected: ``steps`` of the holds, the last one included."""
-    holds = [k for k, phase in enumerate(dance.phases) if phase.kind == "hold"]
-    return [holds[k] for k in sorted({int(k) for k in np.linspace(0, len(holds) - 1, steps + 1).round()[1:]})]
-
-
-def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
-    """Return what is expected when a ``motion`` at (a multiple of) 12.5 Hz stops at each instant ``ends`` (D,) s."""
+def expected_spread(body: Body, motion: Motion, ends: Array, *, robot: bool = False) -> Expectation:
+    """Return what is expected when a ``motion`` at (a multiple of) 12.5 Hz, of a robot at any rate, stops at each
+    instant ``ends`` (D,) s.
+    """
     # One noise for all stretches: their informations are about one point and in the same bands.
-    noise, size = typical_noise(predict_wrench(body, motion)), 10 * len(body.segments)
+    noise = _robot_noise() if robot else typical_noise(predict_wrench(body, motion))
+    size = 10 * len(body.segments)
     told = [MovementEvidence(body, np.zeros((size, size)), Mismatch(*np.zeros((2, size, 1))))]
     for start, end in pairwise([motion.time[0], *ends]):
         use = (motion.time >= start - 1e-9) & (motion.time < end - 1e-9)
         # Information of separate stretches adds.
-        told.append(told[-1] + movement_evidence(body, motion, use, noise=noise))
-    return Expectation.of(body, np.concatenate([[0.0], ends]), [one.posterior() for one in told])
+        told.append(told[-1] + movement_evidence(body, motion, use, noise=noise, robot=robot))
+    posteriors = [one.posterior(body.sip if robot else None) for one in told]
+    return Expectation.of(body, np.concatenate([[0.0], ends]), posteriors)
 
 
 def typical_noise(wrench: Wrench) -> Noise:
@@ -363,3 +394,101 @@ def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:
     q = np.insert(motion.q, before + root, 0.0, axis=1)
     v, a = (np.insert(part, before + body.n_root, 0.0, axis=1) for part in (motion.v, motion.a))
     return Motion(motion.time, q, v, a, joint_names=tuple(joint.name for joint in body.joints))
+
+
+SAMPLE_ERROR = np.array([8.0, 8.0, 8.0, 4.0, 4.0, 4.0])
+"""N, N·m: error of one independent sample of the wrench of a person (residual of the paper: 7.8 N, 4.3 N·m)."""
+SAMPLE_RATE = 4.0
+"""Hz: independent samples per second of moving."""
+_BALLS = (
+    *(("pelvis", "right_thigh"), ("pelvis", "left_thigh"), ("pelvis", "trunk_head")),
+    *(("trunk_head", "right_upper_arm"), ("trunk_head", "left_upper_arm")),
+)
+_UNKNOWN, _SKIN = 0.015, 0.020
+"""m: what is not known of a centre before the movement, and how far skin slides in one posture."""
+CENTRES = 6 * len(_BALLS)
+"""Unknown coordinates of all centres."""
+
+
+class PostureInformation:
+    """What postures of ``chain`` and moves of the plan's duration tell; ``factor`` (10 N, k): the table's covariance is
+    ``factor factor'``; ``scale`` (10 N, k) the same per standard deviation of the table, weighted by the plan.
+
+    Rows (m, k) are per standard deviation; a posterior (k, k) is the covariance of what they multiply, 1 beforehand.
+    """
+
+    def __init__(self, chain: Chain, plan: Plan, *, centres: bool = False) -> None:
+        self.chain, self.centres, self.factor = chain, centres, prior_factor(chain.body.sip)
+        before = np.sum(self.factor**2, axis=1)
+        self.weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
+        # tr(scale C scale'): sum of the variances over those of the table, weighted.
+        self.scale = self.factor * np.sqrt(self.weight / np.where(before > 0, before, 1.0))[:, None]
+        if centres:
+            self.factor = np.pad(self.factor, ((0, 0), (0, CENTRES)))
+            self.scale = block_diag(self.scale, np.eye(CENTRES))
+        way = rest_to_rest(plan.move, via=0, rate=SAMPLE_RATE)
+        # Both ends are at rest: the postures, which count on their own.
+        self._way = [part[1:-1] for part in (way.position, way.velocity, way.acceleration)]
+
+    @property
+    def beforehand(self) -> Array:
+        """(k, k) the posterior before any posture."""
+        return np.eye(self.factor.shape[1])
+
+    def white(self, W: Array) -> Array:
+        """Return regressors (G, 6 T, 10 N) per standard deviation of error and of the table, (G, 6 T, k)."""
+        error = np.tile(SAMPLE_ERROR, W.shape[1] // 6)
+        # F^-1 W S, with S the root of the table's covariance.
+        flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
+        return np.asarray(flat.reshape(*W.shape[:2], -1))
+
+    def standing(self, x: Array) -> Array:
+        """Return the regressor (S, 6, 10 N) of standing still in each posture (S, n)."""
+        motion = self.chain.motion(np.arange(len(x), dtype=float), x, *np.zeros((2, *x.shape)))
+        return np.asarray(regressor(self.chain.body, motion)).reshape(len(x), 6, -1)
+
+    def of_ways(self, ends: Array) -> Array:
+        """Return the rows (G, m, k) of going straight from one posture to another, ``ends`` (G, 2, n)."""
+        # The splines are linear in the ends.
+        x, v, a = ((part @ ends).reshape(-1, ends.shape[2]) for part in self._way)
+        W = regressor(self.chain.body, self.chain.motion(np.arange(len(x)) / SAMPLE_RATE, x, v, a))
+        return self.white(np.asarray(W).reshape(len(ends), -1, W.shape[-1]))
+
+    def of_posture(self, x: Array, standing: Array) -> Array:
+        """Return the rows (m, k) of a posture ``x`` (n,) whose regressor ``standing`` (6, 10 N) is known."""
+        still = self.white(standing[None])[0]
+        return np.concatenate([still, rows_of_centres(self.chain, x, still.shape[1])]) if self.centres else still
+
+    def gains(self, posterior: Array, rows: Array) -> Array:
+        """Return by how much each of ``rows`` (..., m, k) lowers the weighted variance that a posterior leaves."""
+        # tr(scale Z'Z scale').
+        return np.asarray(np.sum((learned(posterior, rows) @ self.scale.T) ** 2, axis=(-2, -1)))
+
+
+def learned(posterior: Array, rows: Array) -> Array:
+    """Return Z (..., m, k) with new covariance = ``posterior`` - Z'Z (k, k) after whitened ``rows`` (..., m, k)."""
+    # Woodbury: P - P X'(1 + X P X')^-1 X P, with L L' = 1 + X P X' and Z = L^-1 X P.
+    spread = rows @ posterior
+    factor = np.linalg.cholesky(np.eye(rows.shape[-2]) + spread @ np.swapaxes(rows, -1, -2))
+    return np.asarray(np.linalg.solve(factor, spread))
+
+
+def update_posterior(posterior: Array, rows: Array) -> Array:
+    """Return the posterior (k, k) after whitened ``rows`` (m, k)."""
+    Z = learned(posterior, rows)
+    return np.asarray(posterior - Z.T @ Z)
+
+
+def rows_of_centres(chain: Chain, x: Array, columns: int) -> Array:
+    """Return the whitened rows (3 J, columns) of a posture ``x`` (n,): per standard deviation of what slides and, in
+    the last `CENTRES` columns, of what is not known of the J centres.
+    """
+    body, out = chain.body, np.zeros((3 * len(_BALLS), columns))
+    turned = np.asarray(poses(body, chain.positions(x[None])).rotation)[0]
+    for k, (near, far) in enumerate(_BALLS):
+        first, second = (turned[body.segments.index(name)] for name in (near, far))
+        here = columns - CENTRES + 6 * k
+        # c - R d = what is to be known of the distance; R = R_near' R_far.
+        out[3 * k : 3 * k + 3, here : here + 6] = np.hstack([np.eye(3), -first.T @ second])
+    # Prior deviation over error.
+    return out * _UNKNOWN / _SKIN

@@ -225,47 +225,21 @@ _STILL = 1e-4  # Least deviation, in the limit's unit
 
 
 @dataclass(frozen=True)
-class PerformersMargin:
-    """The least that performers left of the ``limit``, of which at least ``least`` is demanded: ``worst``, both in its
-    ``unit``; the ``posture`` (index) to or in which, the pair or support ``what``, and ``failing``, the share of
-    performers without enough.
-    """
-
-    limit: str
-    unit: str
-    least: float
-    worst: float
-    posture: int
-    what: str
-    failing: float
-
-
-@dataclass(frozen=True)
 class PerformersResult:
-    """What ``count`` imprecise performers leave of every limit that they must keep: ``least_margins``; ``bad`` postures
-    (indices) at which somebody had too little, with the limit; ``failed`` the numbers of those people.
+    """What ``count`` imprecise performers leave beyond the least of every limit that they must keep: ``margins``, at
+    the start of the posture to or in which that is least; ``bad`` postures (indices) at which somebody had too little,
+    with the limit; ``failed`` the numbers of those people.
     """
 
     count: int
-    least_margins: tuple[PerformersMargin, ...]
+    margins: tuple[Margin, ...]
     bad: tuple[tuple[int, str], ...]
     failed: tuple[int, ...] = ()
-
-    def __getitem__(self, limit: str) -> PerformersMargin:
-        return next(room for room in self.least_margins if room.limit == limit)
-
-    def margins(self, dance: Dance) -> tuple[Margin, ...]:
-        """Return what the performers leave beyond the least as margins of a dance."""
-        starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
-        return tuple(
-            Margin(f"{r.limit}_{OF_PERFORMERS}", r.worst - r.least, starts[r.posture], r.unit, r.what)
-            for r in self.least_margins
-        )
 
     @property
     def safe(self) -> bool:
         """True where everybody keeps every limit."""
-        return all(room.worst >= room.least for room in self.least_margins)
+        return not self.bad
 
 
 def for_imprecise(limits: Iterable[Limit]) -> dict[Limit, ForImprecise]:
@@ -294,14 +268,15 @@ def try_performers(
         halves = [some for some in (who[:half], who[half:]) if some]
         tasks = [workers.submit(_rooms, dance, limits, some, only, how) for some in halves]
         parts = [task.result() for task in tasks]
-    margins, bad, failed = list[PerformersMargin](), set[tuple[int, str]](), set[int]()
+    margins, bad, failed = list[Margin](), set[tuple[int, str]](), set[int]()
+    starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
     for limit, asked in for_imprecise(limits).items():
         room = np.concatenate([part[limit.name][0] for part in parts])
         what = [name for part in parts for name in part[limit.name][1]]
         short = room < asked.least
         k, p = np.unravel_index(int(room.argmin()), room.shape)
-        share = float(short.any(axis=1).mean())
-        margins.append(PerformersMargin(limit.name, limit.unit, asked.least, float(room[k, p]), int(p), what[k], share))
+        worst, name = float(room[k, p]) - asked.least, f"{limit.name}_{OF_PERFORMERS}"
+        margins.append(Margin(name, worst, starts[int(p)], limit.unit, what[k]))
         bad |= {(int(posture), limit.name) for posture in np.flatnonzero(short.any(axis=0))}
         failed |= {who[int(one)] for one in np.flatnonzero(short.any(axis=1))}
     return PerformersResult(len(who), tuple(margins), tuple(sorted(bad)), tuple(sorted(failed)))

@@ -6,9 +6,7 @@ dance is designed, and shrunk again: the same angles, slower or faster. Nothing 
 is checked on the robot as it is.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +16,6 @@ from biodance.body.body import Body
 from biodance.body.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.expectation import Expectation, evenly_spread
-from biodance.dance.limits import Limit
 from biodance.dance.limits.balance import Balance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -30,10 +26,6 @@ from biodance.dance.search.move import Task, exciting_move
 from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
-from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import Fit, empty, layout_for, statistics
-from biodance.motion.dynamics import predict_wrench
-from biodance.uncertainty.noise import Noise
 
 _WHERE = 4  # Beside the seed: what is searched for at random here
 
@@ -128,7 +120,6 @@ def design_robot(
     body: Body,
     plan: Plan,
     *,
-    limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
     tell: Tell | None = None,
     resume: Path | None = None,
@@ -141,7 +132,7 @@ def design_robot(
     BiodanceError
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
-    plan, to = plan.with_limits(limits), person_sized(body)
+    to = person_sized(body)
     long = person_sized_plan(plan, to)
     large, _ = design(similar_body(body, to), long, seed=seed, tell=tell, resume=resume)
     if tell is not None:
@@ -170,23 +161,3 @@ def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
         stances=tuple(small(stance) for stance in dance.stances),
         under=tuple(small(stance) for stance in dance.under),
     )
-
-
-ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
-"""N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
-_RATE = 4.0  # Hz: independent samples of the wrench
-_STEPS = 10  # Durations of a dance after which what is expected is told
-
-
-def expect_robot(dance: Dance) -> Expectation:
-    """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
-    # One band, the same error at all frequencies.
-    body, motion, noise = dance.body, dance.motion(_RATE), Noise(np.diag(ERROR**2)[None], np.zeros(3))
-    wrench, layout = predict_wrench(body, motion), layout_for(noise.about, noise.bands)
-    ends = [dance.phases[k].end for k in evenly_spread(dance, _STEPS)]
-    told = [empty(10 * len(body.segments), layout)]
-    for start, end in pairwise([0.0, *ends]):
-        use = (motion.time >= start) & (motion.time < end)
-        told.append(told[-1] + statistics(body, Fit(dance.protocol, motion, wrench, use), layout))
-    posteriors = [find_posterior(one.information(noise), body.sip) for one in told]
-    return Expectation.of(body, np.array([0.0, *ends]), posteriors)

@@ -26,7 +26,7 @@ from biodance.dance.problem.feet import AROUND, room_on_plates
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
-from biodance.dance.robot import design_robot, expect_robot, robot_plan
+from biodance.dance.robot import design_robot, robot_plan
 from biodance.dance.search.postures import counterpart
 from biodance.dance.search.word_course import NoNextPosture, freer_dance
 from biodance.dance.verify import DanceMetrics, Margin, broken, dance_metrics, longest_alone
@@ -369,7 +369,7 @@ def make_dance(
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
             free = aside.submit(_freer_expectation, dance, plan)
-            expected, counted, freely = (expect_robot if robot else expect)(dance), numbers.result(), free.result()
+            expected, counted, freely = expect(dance), numbers.result(), free.result()
         reason = " ".join(
             f"The limit on {cause_in_words(m.limit, m.what)} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
             for m in broken(margins)

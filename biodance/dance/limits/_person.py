@@ -148,28 +148,36 @@ def _left(seen: Array, greatest: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class FootLoad(Limit):
-    """Share of the vertical ground force that the ``right`` and the ``left`` foot bear at most, both on the ground."""
+    """Share of the vertical ground force that the ``right`` and the ``left`` foot bear at most; 1: no limit of that
+    foot, which may bear all.
+    """
 
     right: float = bounded(1.0, 0.0, 1.0)
     left: float = bounded(1.0, 0.0, 1.0)
     name, unit, scale, suspicion = "foot_load", "N", 50.0, 15
 
+    @property
+    def _limited(self) -> list[int]:
+        return [side for side, share in enumerate((self.right, self.left)) if share < 1]
+
     def margins(self, state: State) -> Margins:
-        """Return how much more each foot may bear, (T, 2) N; none on a stool."""
-        if not state.stance.planted:
+        """Return how much more each foot with a limit may bear, (T, feet) N; none on a stool."""
+        if not state.stance.planted or not self._limited:
             return unconcerned(state)
-        share, (force, by) = np.array([self.right, self.left]), state.feet
+        feet, share, (force, by) = self._limited, np.array([self.right, self.left]), state.feet
         value = share * state.wrench[:, 2:3] - force[:, :, 2]
         # Chain rule: foot by total, total by motion.
         slopes = share[:, None] * state.wrench_slopes[:, :, 2:3] - by[None, :, :, 2] @ state.wrench_slopes
-        return Margins(value, slopes)
+        return Margins(value[:, feet], slopes[:, :, feet])
 
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return how much more each foot may bear, (T, 2) N, from where the soles really are; nothing on a stool."""
-        if not motion.stance.planted:
+        """Return how much more each foot with a limit may bear, (T, feet) N, from where the soles really are; nothing
+        on a stool.
+        """
+        if not motion.stance.planted or not self._limited:
             return NOTHING
         right, left = (sole.mean(axis=1) for sole in motion.soles)
         touching = np.tile([side in motion.stance.planted for side in (0, 1)], (motion.motion.time.size, 1))
         borne = [part.force[:, 2] for part in distribute(motion.wrench, right, left, touching)]
         value = np.array([self.right, self.left]) * motion.wrench.force[:, 2:] - np.stack(borne, axis=1)
-        return Remaining(value, tuple(f"{side}_foot" for side in SIDES))
+        return Remaining(value[:, self._limited], tuple(f"{SIDES[side]}_foot" for side in self._limited))

@@ -16,7 +16,7 @@ class GroundClearance(Limit):
     height: float = bounded(0.0, 0.0, 0.1, "m")
     name, unit, scale, suspicion = "ground_clearance", "m", 0.05, 70
     rounding = 1e-9  # of a sole that has just left the ground
-    tapers = True
+    move_reserve, tapers = 1.0, True  # 5 cm half-way: whose foot drags over the floor stumbles
 
     def margins(self, state: State) -> Margins:
         """Return the room under the corners of the free soles, (T, corners) m; none with both feet down."""

@@ -9,7 +9,7 @@ estimate, the merit function f + weight * largest violation, steps are bounded b
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class NonlinearProgramme:
 
 
 class Evaluation:
-    """Objective and margins at a point of a problem, slopes on demand (`Point`)."""
+    """Objective ``value`` and ``margins`` (m,) >= 0 at a point of a problem, slopes on demand."""
 
     def __init__(self, problem: NonlinearProgramme, state: State) -> None:
         self.problem, self.state = problem, state
@@ -87,24 +87,42 @@ class Evaluation:
         """(T,) what is left in each sample, in the scales of the limits."""
         return np.min([spare.min(axis=1, initial=np.inf) for spare in self._spare], axis=0)
 
-    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return the gradient and the chosen rows of the Jacobian."""
-        closure = Closure(self.state)
-        frames, first, parts = len(self.state.x), 0, []
+    @cached_property
+    def near(self) -> NDArray[np.intp]:
+        """The margins that a step could reach: only they enter its programme."""
+        return np.flatnonzero(self.margins < _NEAR)
+
+    @cached_property
+    def near_slopes(self) -> Array:
+        """(len(near), K * free) slopes of these margins by the points."""
+        return self.jacobian(self.near)
+
+    @cached_property
+    def _closure(self) -> Closure:
+        return Closure(self.state)
+
+    @cached_property
+    def gradient(self) -> Array:
+        """(K * free,) slope of the objective by the points."""
+        # The objective is one number: its slopes by all samples add up.
+        return self._chain(list(self._slope), np.arange(len(self.state.x))).sum(axis=0)
+
+    def jacobian(self, rows: NDArray[np.intp]) -> Array:
+        """Return the slopes (len(rows), K * free) of the chosen margins by the points."""
+        first, parts = 0, [np.empty((0, self.problem.basis.shape[2] * len(self.problem.free)))]
         for margin, scale in self._found:
             size = margin.value.size
             inside = rows[(rows >= first) & (rows < first + size)] - first
-            # The margins lie sample after sample in the flat vector.
-            time, which = np.unravel_index(inside, margin.value.shape)
-            parts.append(self._chain([s[time, which] / scale for s in margin.slopes], time, closure))
             first += size
-        # The objective is one number: its slopes by all samples add up.
-        gradient = self._chain(list(self._slope), np.arange(frames), closure).sum(axis=0)
-        return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
+            if inside.size:
+                # The margins lie sample after sample in the flat vector.
+                time, which = np.unravel_index(inside, margin.value.shape)
+                parts.append(self._chain([s[time, which] / scale for s in margin.slopes], time))
+        return np.concatenate(parts)
 
-    def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
+    def _chain(self, slopes: list[Array], time: NDArray[np.intp]) -> Array:
         """Return slopes (R, K * free) by the points, of slopes (R, n) by x, v, a at the instants ``time`` (R,)."""
-        free, basis = self.problem.free, self.problem.basis
+        free, basis, closure = self.problem.free, self.problem.basis, self._closure
         # Chain rule through the planted legs: x(root), v(root, v), a(root, v, a).
         by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
@@ -119,26 +137,6 @@ class Evaluation:
         return np.asarray(out).reshape(len(time), basis.shape[2] * len(free))
 
 
-class Point(Protocol):
-    """What a problem says about one y: ``value`` f, ``margins`` c (m,), and, only when asked, the slopes."""
-
-    value: float
-    margins: Array
-
-    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return df/dy (n,) and dc/dy (len(rows), n) of the chosen margins."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left)."""
-
-    y: Array
-    value: float
-    violation: float
-
-
 WEIGHT = 100.0
 _NEAR = 1.5  # Margins (in their scale) larger than this cannot become active within one step
 
@@ -147,19 +145,18 @@ _RADIUS, _SETTLED = 0.3, 1e-3
 """The first step's largest change of a variable; a gain that counts as none."""
 
 
-def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: int = 30) -> Solution:
-    """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
+def minimise(problem: NonlinearProgramme, start: Array, *, iterations: int) -> tuple[Array, float]:
+    """Return a local minimum y (n,) from ``start`` and its violation, the largest -c (negative: room left); f and c
+    should be scaled so that 1 is a large amount.
+    """
     y, n = start.copy(), start.size
-    point, hessian = evaluate(y), np.eye(n)
-    radius = _RADIUS
+    point, hessian, radius = problem.evaluate(y), np.eye(n), _RADIUS
     for _ in range(iterations):
-        # Only margins that a step could reach enter the programme.
-        rows = np.flatnonzero(point.margins < _NEAR)
-        gradient, jacobian = point.slopes(rows)
-        step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
+        step, price = quadratic_step(hessian, point.gradient, point.near_slopes, point.margins[point.near], radius)
         # Fall of the merit function that the linear model promises.
-        predicted = -(gradient @ step) + WEIGHT * (worst(point.margins) - worst(point.margins[rows] + jacobian @ step))
-        trial = evaluate(y + step)
+        left = point.margins[point.near] + point.near_slopes @ step
+        predicted = -(point.gradient @ step) + WEIGHT * (worst(point.margins) - worst(left))
+        trial = problem.evaluate(y + step)
         gained = point.value - trial.value + WEIGHT * (worst(point.margins) - worst(trial.margins))
         if gained < 0.05 * predicted or not np.isfinite(gained):
             radius *= 0.35
@@ -169,13 +166,13 @@ def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: in
                 continue
         elif gained > 0.7 * predicted:
             radius = min(2 * radius, 1.0)
-        new_gradient, new_jacobian = trial.slopes(rows)
         # Change of the gradient of the Lagrangian, f - price' c, with the prices of this step.
-        hessian = update(hessian, step, new_gradient - gradient - price @ (new_jacobian - jacobian))
+        bend = trial.gradient - point.gradient - price @ (trial.jacobian(point.near) - point.near_slopes)
+        hessian = update(hessian, step, bend)
         y, point = y + step, trial
         if gained < _SETTLED and worst(point.margins) < 1e-4:
             break
-    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)))
+    return y, float(-point.margins.min(initial=np.inf))
 
 
 def worst(margins: Array) -> float:

@@ -1,13 +1,13 @@
 """Where the feet stand and which part of the ground may carry the weight."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Index, assign, freeze
 from biodance.threads import Sendable
 
@@ -110,6 +110,11 @@ class Stance(Sendable):
         return normals, -np.einsum("ij,ij->i", normals, corners)
 
     @cached_property
+    def key(self) -> str:
+        """What the feet are known by: who stands on the same ones may take the same postures."""
+        return f"{self.name} {self.planted} {self.over} {self.ankle.tobytes().hex()}"
+
+    @cached_property
     def whole(self) -> "Stance":
         """The same feet, wherever above them the weight is."""
         return self if self.over is None else replace(self, over=None)
@@ -202,16 +207,12 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
 
 def hip_width(body: Body) -> float:
     """Return the distance (m) sideways between the ankles of the upright body: its hips' with straight legs."""
-    from biodance.motion.kinematics import poses
-
     place = poses(body, body.neutral[None]).position[0]
     return float(place[body.feet["left"].segment, 1] - place[body.feet["right"].segment, 1])
 
 
 def stature_of(body: Body) -> float:
     """Return the height (m) of the upright body: top of its highest box over its soles."""
-    from biodance.motion.kinematics import poses
-
     pose = poses(body, body.neutral[None])
     tops = [float((pose.position[0, i] + pose.rotation[0, i] @ box[1])[2]) for i, box in enumerate(body.boxes)]
     foot = body.feet["right"]
@@ -239,12 +240,6 @@ def stance_words(stance: Stance) -> str:
     """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
     weight = "" if stance.over is None else f", the weight on the {SIDES[stance.over]} one"
     return _FEET[stance.name] + weight
-
-
-def stance_fields(stance: Stance) -> dict[str, Any]:
-    """Return a stance in words that JSON knows."""
-    found = {field.name: getattr(stance, field.name) for field in fields(stance)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
 
 
 def support_depth(stances: Sequence[Stance], on: Index, point: Array, share: float = 1.0) -> Array:

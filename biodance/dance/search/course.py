@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, feet_in_move
+from biodance.dance.search.known_postures import PostureTable
 from biodance.dance.search.move import Move, Task, exciting_move
 from biodance.records import Array
 
@@ -91,46 +92,43 @@ class DesignContext:
         )
 
 
-class DanceStep(Protocol):
-    """One posture of a course."""
+@dataclass(frozen=True, eq=False)
+class DanceStep:
+    """Posture ``s`` of a ``table``, what is ``said`` on the way there; ``mirror`` True for the last one's image."""
+
+    table: PostureTable
+    s: int = 0
+    said: tuple[str, ...] = ()
+    mirror: bool = False
 
     @property
     def x(self) -> Array:
         """(n,) coordinates of the chain."""
+        return np.asarray(self.table.x[self.s])
 
     @property
     def stance(self) -> Stance:
         """The feet on which it is held."""
+        return self.table.stance
 
     @property
     def name(self) -> str:
         """What people call it; "" where they have no words for it."""
+        return self.table.name_of(self.s)
 
     @property
-    def mirror(self) -> bool:
-        """Whether it is the posture before it with right and left exchanged."""
+    def key(self) -> tuple[str, int]:
+        """What the posture is known by, on whatever way somebody came to it."""
+        return self.stance.key, self.s
 
 
 @dataclass(frozen=True, eq=False)
-class PlainStep:
-    """A `DanceStep` for which there are no words."""
-
-    x: Array
-    stance: Stance
-    name: str = ""
-    mirror: bool = False
-
-
-S = TypeVar("S", bound=DanceStep)
-
-
-@dataclass(frozen=True, eq=False)
-class Course(Generic[S]):
+class Course:
     """The ``steps`` (P) of a dance, those in between included, the ``moves`` (P - 1) between them, None where they are
     not found yet, and in sentences what differs from the plan.
     """
 
-    steps: tuple[S, ...]
+    steps: tuple[DanceStep, ...]
     moves: tuple[Move | None, ...]
     notes: tuple[str, ...] = ()
 
@@ -145,8 +143,8 @@ class Course(Generic[S]):
         return tuple(step.stance for step in self.steps)
 
     def spliced(
-        self, first: int, last: int, steps: tuple[S, ...], moves: tuple[Move | None, ...] | None = None
-    ) -> "Course[S]":
+        self, first: int, last: int, steps: tuple[DanceStep, ...], moves: tuple[Move | None, ...] | None = None
+    ) -> "Course":
         """Return the course with ``steps`` in place of those from ``first`` up to ``last`` (not included), and with the
         ``moves`` to, between and from them; without these they are yet to be found.
         """
@@ -196,7 +194,7 @@ def move_task(work: DesignContext, before: DanceStep, after: DanceStep, *, slowe
 _KEPT = ("via", "duration", "gram", "violation", "limit", "stops")  # What a checkpoint keeps of a move
 
 
-def with_exciting_moves(work: DesignContext, course: Course[PlainStep], attempt: int = 0) -> Course[PlainStep]:
+def with_exciting_moves(work: DesignContext, course: Course, attempt: int = 0) -> Course:
     """Return the course with those moves found that it lacks; ``attempt`` numbers the courses of one design. A move
     that breaks a limit says so (``Move.limit``); those after it are found all the same.
     """
@@ -206,7 +204,7 @@ def with_exciting_moves(work: DesignContext, course: Course[PlainStep], attempt:
 class _Chains:
     """The open moves in one queue for each set of planted feet, and the information of those that are found."""
 
-    def __init__(self, work: DesignContext, course: Course[PlainStep], attempt: int) -> None:
+    def __init__(self, work: DesignContext, course: Course, attempt: int) -> None:
         self.work, self.attempt, self.moves = work, attempt, [*course.moves]
         self.tasks = [move_task(work, *pair) for pair in pairwise(course.steps)]
         nothing = np.zeros((len(work.chain.body.segments), 6, 6))

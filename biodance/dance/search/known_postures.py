@@ -2,7 +2,7 @@
 words can make on given feet, with the pelvis where it keeps the balance.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -288,21 +288,21 @@ _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 
 @dataclass(frozen=True, eq=False)
 class PostureTable:
-    """``words`` of every part of the body on the feet of ``stance``; posture s has the words ``index[s]`` (S, parts)
-    and the coordinates ``x`` (S, n).
+    """Postures ``x`` (S, n) on the feet of ``stance``; with ``words`` of every part of the body posture s has the words
+    ``index[s]`` (S, parts), optimised ones have none.
     """
 
     chain: Chain
     stance: Stance
-    words: Vocabulary
-    index: NDArray[np.intp]
     x: Array
+    words: Vocabulary = field(default_factory=dict)
+    index: NDArray[np.intp] = field(default_factory=lambda: np.empty((0, 0), dtype=np.intp))
 
     @classmethod
     def of(cls, chain: Chain, stance: Stance, words: Vocabulary) -> "PostureTable":
         """Return all combinations of ``words`` on the feet ``stance``."""
         index = np.array(list(product(*(range(len(group)) for group in words.values()))), dtype=np.intp)
-        return cls(chain, stance, words, index, posed(chain, stance, words, index))
+        return cls(chain, stance, posed(chain, stance, words, index), words, index)
 
     @cached_property
     def parts(self) -> tuple[str, ...]:
@@ -334,6 +334,18 @@ class PostureTable:
         """Return the word of every part of posture ``s``."""
         return {part: self.words[part][k] for part, k in zip(self.parts, self.index[s], strict=True)}
 
+    def name_of(self, s: int) -> str:
+        """Return the words of all parts that do not rest in posture ``s``; of arms that do the same, once."""
+        if not self.words:
+            return ""
+        out, said = list[str](), self.words_of(s)
+        for part, word in said.items():
+            if not part.endswith(("_arm", "_hanging")) and (not word.rest or part.endswith("_lifted")):
+                out.append(word.text)
+        for kind in ("arm", "hanging"):
+            out += _pair_words([word for part, word in said.items() if part.endswith(f"_{kind}")])
+        return ", ".join(out) or ("sit" if self.stance.seat else "stand")
+
     def keeps(self, s: int, limits: tuple[Limit, ...]) -> tuple[float, str]:
         """Return by how many deviations of imprecise people posture ``s`` keeps the limits and the one of which that is
         least; minus infinity where itself it breaks one or leaves too little for moves.
@@ -345,6 +357,16 @@ class PostureTable:
         no_way = np.empty((0, 2, self.chain.size))
         held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
         return deviations_of_copies(held, limits, np.zeros(1))
+
+
+def _pair_words(pair: list[Word]) -> list[str]:
+    """Return what the ``right`` and the left limb do, together where it is the same."""
+    if not pair or all(word.rest for word in pair):
+        return []
+    if pair[0].key == pair[1].key:
+        return [pair[0].text.format("both")]
+    sides = zip(("the right", "the left"), pair, strict=True)
+    return [singular(word.text.format(side)) for side, word in sides if not word.rest]
 
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:

@@ -219,11 +219,11 @@ def improving_moves(
     for k, iterations in enumerate(rounds):
         reserve = RESERVE * (1 + k / 4)
         problem = task.problem(via, free, time, reserve=reserve, objective=objective)
-        solution = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations)
-        via[:, free] = solution.y.reshape(2, -1)
+        y, violation = minimise(problem, via[:, free].ravel(), iterations=iterations)
+        via[:, free] = y.reshape(2, -1)
         found, instants = evaluate_move(task, via.copy())
         # The violation is that of the margins less the reserve: without it, less by as much.
-        yield found, solution.violation - reserve
+        yield found, violation - reserve
         # The worst instants of the fine grid join the coarse one.
         time = np.union1d(time, instants)
 

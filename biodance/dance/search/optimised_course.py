@@ -11,13 +11,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.expectation import PostureInformation, update_posterior
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import PostureInformation, static_grams, update_posterior
+from biodance.dance.problem.excitation import static_grams
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.search import postures
-from biodance.dance.search.course import Course, DesignContext, PlainStep, with_exciting_moves
+from biodance.dance.search.course import Course, DanceStep, DesignContext, with_exciting_moves
+from biodance.dance.search.known_postures import PostureTable
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -32,7 +34,7 @@ _FEWER = 4
 """Postures that may be left out, one after the other, as long as half of those on the same feet are left."""
 
 
-def optimised_course(work: DesignContext) -> Course[PlainStep]:
+def optimised_course(work: DesignContext) -> Course:
     """Return the postures and moves of a dance, all of which keep the limits.
 
     Raises
@@ -44,7 +46,7 @@ def optimised_course(work: DesignContext) -> Course[PlainStep]:
     return feasible_course(work, _postures(work))
 
 
-def _postures(work: DesignContext) -> Course[PlainStep]:
+def _postures(work: DesignContext) -> Course:
     """Return all postures in the order of the dance, those in between included."""
     plan, chain = work.plan, work.chain
     counted = [s for s in support_sequence(chain.body, plan) if s.over is None]
@@ -65,7 +67,7 @@ def _postures(work: DesignContext) -> Course[PlainStep]:
     return _with_stops(work, stances, x[nearest_neighbours(x, [*groups.values()])])
 
 
-def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> Course[PlainStep]:
+def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> Course:
     """Return the course of the postures ``x`` on those of the ``stances`` that count, and of found ones on the others,
     on which the weight is over one foot of two.
     """
@@ -76,7 +78,7 @@ def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> C
         near = np.array([rows[p] for p in (before, *after)])
         seed = [work.seed, 2, k]
         rows[k] = postures.intermediate_posture(work.chain, stances[k], near, work.plan.limits, seed=seed).x
-    steps = tuple(PlainStep(rows[k], stance) for k, stance in enumerate(stances))
+    steps = tuple(DanceStep(PostureTable(work.chain, stance, rows[k][None])) for k, stance in enumerate(stances))
     return Course(steps, (None,) * (len(steps) - 1))
 
 
@@ -152,7 +154,7 @@ def _shortened(path: list[int], apart: Array, before: int | None) -> list[int]:
     return ends[1:-1]
 
 
-def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[PlainStep]:
+def feasible_course(work: DesignContext, course: Course) -> Course:
     """Return the course with moves that keep all limits, and in sentences what of its postures had to change.
 
     Raises
@@ -187,7 +189,7 @@ def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[Pl
     return course
 
 
-def _other_step(work: DesignContext, course: Course[PlainStep], place: int, attempt: int) -> PlainStep:
+def _other_step(work: DesignContext, course: Course, place: int, attempt: int) -> DanceStep:
     """Return another posture for a place."""
     stance, limits = course.stances[place], work.plan.limits
     if stance.over is None:
@@ -196,10 +198,10 @@ def _other_step(work: DesignContext, course: Course[PlainStep], place: int, atte
         near = np.delete(course.x, place, axis=0)[max(0, place - 1) : place + 1]
         seed, mild = [work.seed, 5, attempt, place], _REST[attempt - 1]
         x = postures.intermediate_posture(work.chain, stance, near, limits, seed=seed, mild=mild).x
-    return PlainStep(x, stance)
+    return DanceStep(PostureTable(work.chain, stance, x[None]))
 
 
-def _other_posture(work: DesignContext, course: Course[PlainStep], place: int, rng: np.random.Generator) -> Array:
+def _other_posture(work: DesignContext, course: Course, place: int, rng: np.random.Generator) -> Array:
     """Return the most exciting posture (n,) beside all others from a few fresh starts, or the old one."""
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
     counted = [step for k, step in enumerate(course.steps) if step.stance.over is None and k != place]
@@ -217,7 +219,7 @@ def _other_posture(work: DesignContext, course: Course[PlainStep], place: int, r
     return min(kept, key=lambda p: postures.criterion(blocks, [*others, p])).x if kept else course.steps[place].x
 
 
-def _spare(course: Course[PlainStep], k: int, first: Course[PlainStep]) -> set[int]:
+def _spare(course: Course, k: int, first: Course) -> set[int]:
     """Return the end of move ``k`` that can be left out: a posture that counts, of a kind of which half is left of the
     ``first`` course; none if there is no such end.
     """
@@ -229,7 +231,7 @@ def _spare(course: Course[PlainStep], k: int, first: Course[PlainStep]) -> set[i
     return set()
 
 
-def _changed(course: Course[PlainStep], place: int, what: str, limits: dict[int, str]) -> str:
+def _changed(course: Course, place: int, what: str, limits: dict[int, str]) -> str:
     """Return in a sentence what became of a posture, and which of the ``limits`` of moves (by index) is the reason."""
     number = sum(stance.over is None for stance in course.stances[: place + 1])
     stance, limit = course.stances[place], next(limits[k] for k in (place - 1, place) if k in limits)

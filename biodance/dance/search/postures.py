@@ -181,8 +181,7 @@ def solve(
     kept = tuple(limit for limit in limits if limit.at_rest)
     reserve = np.array([[limit.hold_reserve(stance) for limit in kept]])
     problem = NonlinearProgramme(chain, stance, base, basis, free, kept, objective, reserve)
-    found = minimise(problem.evaluate, begin[free], iterations=iterations)
-    state = problem.state(found.y)
+    state = problem.state(minimise(problem, begin[free], iterations=iterations)[0])
     return Posture(state.x[0], uprights(state)[0], *Evaluation(problem, state).worst, hard=effort(state)[0])
 
 
@@ -205,8 +204,8 @@ def describe(state: State, limit: Limit) -> str:
     elif unit == "m":
         missing, unit = 100 * missing, "cm"
     what = f"{limit.name} of {left.of[column]}".replace("_", " ")
-    if missing < 0:
-        return f"{what} ({-missing:.0f} {unit} left, less than its reserve)"
+    if missing <= 0:
+        return f"{what} ({abs(missing):.0f} {unit} left, less than its reserve)"
     return f"{what} (short by about {missing:.0f} {unit})"
 
 

@@ -19,18 +19,16 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.dance import Dance
-from biodance.dance.problem.excitation import PostureInformation, update_posterior
+from biodance.dance.expectation import PostureInformation, update_posterior
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via
 from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
-from biodance.dance.search.course import Course, DesignContext, move_task
+from biodance.dance.search.course import Course, DanceStep, DesignContext, move_task
 from biodance.dance.search.known_postures import (
     PostureTable,
-    Word,
     nearest_in_words,
     read_vocabulary,
-    singular,
     words_for,
     words_left_out,
     words_never_kept,
@@ -42,135 +40,9 @@ from biodance.records import Array
 _PARTS = 2  # Parts of the body that change at a time
 
 
-@dataclass(frozen=True, eq=False)
-class WordStep:
-    """Posture ``s`` of a ``table``, what is ``said`` on the way to it; ``mirror`` True for the last one's
-    image (a `DanceStep`).
-    """
-
-    table: PostureTable
-    s: int
-    said: tuple[str, ...]
-    mirror: bool = False
-
-    @property
-    def x(self) -> Array:
-        """(n,) coordinates."""
-        return np.asarray(self.table.x[self.s])
-
-    @property
-    def stance(self) -> Stance:
-        """The feet on which it is held."""
-        return self.table.stance
-
-    @property
-    def words(self) -> dict[str, Word]:
-        """The word of every part."""
-        return self.table.words_of(self.s)
-
-    @property
-    def name(self) -> str:
-        """The words of all parts that do not rest; of arms that do the same, once."""
-        out = []
-        for part, word in self.words.items():
-            if not part.endswith(("_arm", "_hanging")) and (not word.rest or part.endswith("_lifted")):
-                out.append(word.text)
-        for kind in ("arm", "hanging"):
-            out += _pair_words([word for part, word in self.words.items() if part.endswith(f"_{kind}")])
-        return ", ".join(out) or ("sit" if self.stance.seat else "stand")
-
-    @property
-    def key(self) -> tuple[str, int]:
-        """What the posture is known by, on whatever way somebody came to it."""
-        return feet_key(self.stance), self.s
-
-
-def _pair_words(pair: list[Word]) -> list[str]:
-    """Return what the ``right`` and the left limb do, together where it is the same."""
-    if not pair or all(word.rest for word in pair):
-        return []
-    if pair[0].key == pair[1].key:
-        return [pair[0].text.format("both")]
-    sides = zip(("the right", "the left"), pair, strict=True)
-    return [singular(word.text.format(side)) for side, word in sides if not word.rest]
-
-
-@dataclass(eq=False)
-class Reachability:
-    """The postures of one design and what follows on what, worked out once; ``can`` says whether this body can go from
-    one step to another.
-    """
-
-    work: DesignContext
-    can: Callable[[WordStep, WordStep], bool]
-    _tables: dict[str, PostureTable] = field(default_factory=dict)
-    _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
-    _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.words = read_vocabulary()
-
-    def table(self, stance: Stance) -> PostureTable:
-        """Return all postures on the feet ``stance``."""
-        key = feet_key(stance)
-        if key not in self._tables:
-            rng = np.random.default_rng([self.work.seed, 6])
-            chain, plan = self.work.chain, self.work.plan
-            words = words_for(chain.body, plan, stance, self.words, rng)
-            self._tables[key] = PostureTable.of(chain, stance, words)
-        return self._tables[key]
-
-    def after(self, last: WordStep | None, table: PostureTable) -> Iterator[WordStep]:
-        """Yield all postures of a table that may follow on the last one."""
-        if np.isinf(self.work.plan.instructions):
-            yield from (WordStep(table, s, ()) for s in range(len(table.index)))
-            return
-        steps = (self._called(last, table, s) for s in _near(last, table))
-        yield from (step for step in steps if step is not None)
-
-    def link(self, last: WordStep, table: PostureTable, s: int) -> WordStep | None:
-        """Return posture ``s`` as it follows on the last one, None if it may not."""
-        return self._called(last, table, s) if s in _near(last, table) else None
-
-    def _called(self, last: WordStep | None, table: PostureTable, s: int) -> WordStep | None:
-        body, most = self.work.chain.body, self.work.plan.instructions
-        if last is not None and last.table is table and s == table.mirrored[last.s]:
-            return WordStep(table, s, MIRROR_CALL, mirror=True)
-        before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.stance)
-        said = instructions(body, before, table.x[s], feet, table.stance)
-        most += feet is None and bool(table.stance.holding)  # to take hold of the frame, before it begins
-        return WordStep(table, s, said) if len(said) <= most else None
-
-    def leads(self, table: PostureTable, s: int, goal: PostureTable, steps: int) -> bool:
-        """Return whether posture ``s`` leads in at most so many ``steps`` to one of ``goal``, the arms at rest."""
-        return any(self._goes(int(row), table, goal) for row in self._within(table, s, steps - 1))
-
-    def _within(self, table: PostureTable, s: int, steps: int) -> NDArray[np.intp]:
-        """Return the postures that are so many ``steps`` at most from ``s``, on the same feet, the arms at rest."""
-        key = feet_key(table.stance), int(table.arms_at_rest[s]), steps
-        if key not in self._around:
-            found = np.array([key[1]])
-            if steps:
-                rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
-                here = [WordStep(table, int(k), ()) for k in near]
-                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
-            self._around[key] = found
-        return self._around[key]
-
-    def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
-        """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
-        key = feet_key(table.stance), s, feet_key(goal.stance)
-        if key not in self._going:
-            last = WordStep(table, s, ())
-            near = np.intersect1d(_near(last, goal), np.unique(goal.arms_at_rest))
-            steps = (self._called(last, goal, int(t)) for t in near)
-            self._going[key] = any(step is not None and self.can(last, step) for step in steps)
-        return self._going[key]
-
-
-def _near(last: WordStep | None, table: PostureTable) -> list[int]:
+def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
-    was = {part: word.key for part, word in last.words.items()} if last is not None else {}
+    was = {part: word.key for part, word in last.table.words_of(last.s).items()} if last is not None else {}
     off = np.zeros(len(table.index), dtype=int)
     for column, part in enumerate(table.parts):
         keys = np.array([word.key for word in table.words[part]])[table.index[:, column]]
@@ -179,11 +51,6 @@ def _near(last: WordStep | None, table: PostureTable) -> list[int]:
     if last is not None and last.table is table and table.mirrored[last.s] >= 0:
         near = sorted({*near, int(table.mirrored[last.s])})
     return near
-
-
-def feet_key(stance: Stance) -> str:
-    """Return what a foot configuration is known by."""
-    return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
 
 
 LEAST = 2
@@ -239,15 +106,15 @@ class _Place:
     """
 
     posterior: Array
-    step: WordStep | None = None
+    step: DanceStep | None = None
     move: Move | None = None
-    left: Iterator[tuple[WordStep, Move | None]] | None = None
+    left: Iterator[tuple[DanceStep, Move | None]] | None = None
 
 
 @dataclass(eq=False)
 class WordSearch:
     """The search for one dance, whose postures and moves leave imprecise people ``enough`` deviations; what was worked
-    out is kept, so that another look costs little.
+    out (postures, what follows on what, moves) is kept, so that another look costs little.
     """
 
     work: DesignContext
@@ -255,16 +122,15 @@ class WordSearch:
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
     _standing: dict[str, Array] = field(default_factory=dict)
+    _tables: dict[str, PostureTable] = field(default_factory=dict)
+    _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
+    _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        plan = self.work.plan
-        self.reachability = Reachability(
-            self.work,
-            lambda last, step: not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit),
-        )
-        self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
+        self.words = read_vocabulary()
+        self.information = PostureInformation(self.work.chain, self.work.plan, centres=self.work.plan.lively)
 
-    def course(self, stances: tuple[Stance, ...]) -> Course[WordStep]:
+    def course(self, stances: tuple[Stance, ...]) -> Course:
         """Return one step for each of ``stances`` and the moves between them.
 
         Raises
@@ -297,16 +163,16 @@ class WordSearch:
     def _check_feet(self, stances: tuple[Stance, ...]) -> None:
         """Raise `NoNextPosture` where this body cannot change feet in any posture of trunk and legs."""
         for number, pair in enumerate(pairwise(stances), start=1):
-            if feet_key(pair[0]) == feet_key(pair[1]):
+            if pair[0].key == pair[1].key:
                 continue
-            was, now = (self.reachability.table(stance) for stance in pair)
-            if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
+            was, now = (self.table(stance) for stance in pair)
+            if not any(self.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
 
-    def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
+    def postures(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
         """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
-        steps, posterior = list[WordStep](), self.information.beforehand
+        steps, posterior = list[DanceStep](), self.information.beforehand
         for number in range(len(stances)):
             step = next((one for one in self._ranked(steps, stances, posterior) if not self._kept(one)[1]), None)
             if step is None:
@@ -315,25 +181,25 @@ class WordSearch:
             steps.append(step)
         return steps
 
-    def posterior_after(self, posterior: Array, steps: list[WordStep], step: WordStep) -> Array:
+    def posterior_after(self, posterior: Array, steps: list[DanceStep], step: DanceStep) -> Array:
         """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``posterior``."""
         return update_posterior(posterior, self._rows(steps[-1] if steps else None, step))
 
     def possible(
         self,
-        steps: list[WordStep],
+        steps: list[DanceStep],
         stances: tuple[Stance, ...],
         posterior: Array,
         why: dict[str, int],
         *,
-        wanted: Callable[[WordStep], bool] = lambda _: True,
-    ) -> Iterator[tuple[WordStep, Move | None]]:
+        wanted: Callable[[DanceStep], bool] = lambda _: True,
+    ) -> Iterator[tuple[DanceStep, Move | None]]:
         """Yield the postures that follow and are ``wanted`` with the move to them, the best first, of a handful those
         first that imprecise people surely can; ``why`` counts the limits that others break.
         """
         last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, posterior))
         while some := list(islice(ranked, _AT_ONCE)):
-            doubtful = list[tuple[float, WordStep, Move | None]]()
+            doubtful = list[tuple[float, DanceStep, Move | None]]()
             for step in some:
                 room, broken, move = *self._kept(step), None
                 if last is not None and not broken:
@@ -349,7 +215,7 @@ class WordSearch:
 
     def _stuck(self, stances: tuple[Stance, ...], number: int, why: dict[str, int]) -> NoNextPosture:
         """Return why there is no posture in place ``number``, of the limits that others broke counted in ``why``."""
-        table, plan = self.reachability.table(stances[number]), self.work.plan
+        table, plan = self.table(stances[number]), self.work.plan
         if number == 0 or not why:
             return NoNextPosture(nearest_in_words(table, plan.limits), stances, number)
         most = max(why, key=lambda name: why[name]).replace("_", " ")
@@ -357,12 +223,12 @@ class WordSearch:
             f"most of those within {plan.instructions:g} instructions exceed the limit on {most}", stances, number
         )
 
-    def _ranked(self, steps: list[WordStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[WordStep]:
+    def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[DanceStep]:
         """Yield the postures within reach on the next feet, the best first."""
-        stance, table = stances[len(steps)], self.reachability.table(stances[len(steps)])
+        stance, table = stances[len(steps)], self.table(stances[len(steps)])
         last = steps[-1] if steps else None
         used, late = {step.s for step in steps if step.table is table}, self._late(len(steps), stances)
-        found = [step for step in self.reachability.after(last, table) if step.s not in used]
+        found = [step for step in self.after(last, table) if step.s not in used]
         if not found:
             return
         if stance.over is not None:
@@ -378,50 +244,111 @@ class WordSearch:
         yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on
 
-    def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[WordStep], bool]:
+    def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[DanceStep], bool]:
         """Return what says whether a posture in place ``number`` cannot be undone before the feet must change."""
-        feet = feet_key(stances[number])
-        left = next((k for k, one in enumerate(stances[number:]) if feet_key(one) != feet), 0)
+        feet = stances[number].key
+        left = next((k for k, one in enumerate(stances[number:]) if one.key != feet), 0)
         if not left or np.isinf(self.work.plan.instructions):
             return lambda step: False
-        goal = self.reachability.table(stances[number + left])
-        return lambda step: not self.reachability.leads(step.table, step.s, goal, left)
+        goal = self.table(stances[number + left])
+        return lambda step: not self.leads(step.table, step.s, goal, left)
 
-    def _seconds(self, steps: list[WordStep]) -> Array:
+    def _seconds(self, steps: list[DanceStep]) -> Array:
         """Return what each step costs, s."""
         plan = self.work.plan
         return np.array([plan.move + plan.hold + _INSTRUCTION * plan.simplicity * len(step.said) for step in steps])
 
-    def _kept(self, step: WordStep) -> tuple[float, str]:
+    def _kept(self, step: DanceStep) -> tuple[float, str]:
         """Return by how many deviations imprecise people keep a posture, and the limit that they break, "" if none."""
         if step.key not in self._held:
             found, limit = step.table.keeps(step.s, self.work.plan.limits)
             self._held[step.key] = found, limit if found < self.enough else ""
         return self._held[step.key]
 
-    def move(self, last: WordStep, step: WordStep) -> Move:
+    def table(self, stance: Stance) -> PostureTable:
+        """Return all postures on the feet ``stance``."""
+        key = stance.key
+        if key not in self._tables:
+            rng = np.random.default_rng([self.work.seed, 6])
+            chain, plan = self.work.chain, self.work.plan
+            words = words_for(chain.body, plan, stance, self.words, rng)
+            self._tables[key] = PostureTable.of(chain, stance, words)
+        return self._tables[key]
+
+    def after(self, last: DanceStep | None, table: PostureTable) -> Iterator[DanceStep]:
+        """Yield all postures of a table that may follow on the last one."""
+        if np.isinf(self.work.plan.instructions):
+            yield from (DanceStep(table, s) for s in range(len(table.index)))
+            return
+        steps = (self._called(last, table, s) for s in _near(last, table))
+        yield from (step for step in steps if step is not None)
+
+    def link(self, last: DanceStep, table: PostureTable, s: int) -> DanceStep | None:
+        """Return posture ``s`` as it follows on the last one, None if it may not."""
+        return self._called(last, table, s) if s in _near(last, table) else None
+
+    def _called(self, last: DanceStep | None, table: PostureTable, s: int) -> DanceStep | None:
+        body, most = self.work.chain.body, self.work.plan.instructions
+        if last is not None and last.table is table and s == table.mirrored[last.s]:
+            return DanceStep(table, s, MIRROR_CALL, mirror=True)
+        before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.stance)
+        said = instructions(body, before, table.x[s], feet, table.stance)
+        most += feet is None and bool(table.stance.holding)  # to take hold of the frame, before it begins
+        return DanceStep(table, s, said) if len(said) <= most else None
+
+    def leads(self, table: PostureTable, s: int, goal: PostureTable, steps: int) -> bool:
+        """Return whether posture ``s`` leads in at most so many ``steps`` to one of ``goal``, the arms at rest."""
+        return any(self._goes(int(row), table, goal) for row in self._within(table, s, steps - 1))
+
+    def _within(self, table: PostureTable, s: int, steps: int) -> NDArray[np.intp]:
+        """Return the postures that are so many ``steps`` at most from ``s``, on the same feet, the arms at rest."""
+        key = table.stance.key, int(table.arms_at_rest[s]), steps
+        if key not in self._around:
+            found = np.array([key[1]])
+            if steps:
+                rows, near = np.unique(table.arms_at_rest), self._within(table, s, steps - 1)
+                here = [DanceStep(table, int(k)) for k in near]
+                found = np.array([t for t in rows if t in near or any(self.link(one, table, t) for one in here)])
+            self._around[key] = found
+        return self._around[key]
+
+    def _goes(self, s: int, table: PostureTable, goal: PostureTable) -> bool:
+        """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a table."""
+        key = table.stance.key, s, goal.stance.key
+        if key not in self._going:
+            last = DanceStep(table, s)
+            near = np.intersect1d(_near(last, goal), np.unique(goal.arms_at_rest))
+            steps = (self._called(last, goal, int(t)) for t in near)
+            self._going[key] = any(step is not None and self.can(last, step) for step in steps)
+        return self._going[key]
+
+    def can(self, last: DanceStep, step: DanceStep) -> bool:
+        """Return whether this body can go from one step to another, as imprecisely as people do."""
+        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
+
+    def move(self, last: DanceStep, step: DanceStep) -> Move:
         """Return the move from one step to the next, as `straight_move` finds it."""
         return self._judged_move(last, step)[0]
 
-    def _judged_move(self, last: WordStep, step: WordStep) -> tuple[Move, float]:
+    def _judged_move(self, last: DanceStep, step: DanceStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             self._moves[key] = straight_move(self.task(last, step), (last.stance, step.stance), self.enough)
         return self._moves[key]
 
-    def task(self, last: WordStep, step: WordStep) -> Task:
+    def task(self, last: DanceStep, step: DanceStep) -> Task:
         """Return what a move from one step to the next must do."""
         slower = _LIFTING if last.stance.planted != step.stance.planted else 1.0
         return move_task(self.work, last, step, slower=slower)
 
     def _still(self, table: PostureTable) -> Array:
         """Return the regressors (S, 6, 10 N) of standing still in all postures of a table."""
-        key = feet_key(table.stance)
+        key = table.stance.key
         if key not in self._standing:
             self._standing[key] = self.information.standing(table.x)
         return self._standing[key]
 
-    def _rows(self, last: WordStep | None, step: WordStep) -> Array:
+    def _rows(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
         still = self.information.of_posture(step.x, self._still(step.table)[step.s])
         if last is None:
@@ -429,7 +356,7 @@ class WordSearch:
         return np.concatenate([still, self.information.of_ways(np.array([[last.x, step.x]]))[0]])
 
 
-def word_course(search: WordSearch) -> Course[WordStep]:
+def word_course(search: WordSearch) -> Course:
     """Return the course that a search finds; what this person cannot do of the plan is left out, and this is said:
     words, feet on which there is no posture, and postures beyond those that follow on each other.
 
@@ -449,9 +376,9 @@ def word_course(search: WordSearch) -> Course[WordStep]:
             notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
         else:
-            notes += words_left_out(body, plan, course.stances, search.reachability.words)
+            notes += words_left_out(body, plan, course.stances, search.words)
             if plan.careful:  # the words that a person with own limits can do on none of the feet
-                tables = {feet_key(one): search.reachability.table(one) for one in course.stances if one.over is None}
+                tables = {one.key: search.table(one) for one in course.stances if one.over is None}
                 notes += (said for one in tables.values() for said in words_never_kept(one, plan.limits))
             return replace(course, notes=tuple(dict.fromkeys(notes)))
 
