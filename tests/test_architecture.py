@@ -353,6 +353,7 @@ NAMED_ELSEWHERE = {
     "biodance.body.human.human": "joint_centre, a row of the table of error sizes",
     "biodance.body.human.static_centres": "joint_centre, a row of the table of error sizes",
     "biodance.body.tables.choice": "trunk_joint, the body's optional joint",
+    "biodance.motion.ik.joint_fit": "marker_misplaced, a row of the table of error sizes",
     "biodance.body.tables.segment_data": "body_mass, a key of the tables of segments",
     "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
