@@ -44,7 +44,9 @@ KEYWORDS = {"say": None, "N_": None, "count": (1, 2)}
 
 
 def sentences() -> set[str]:
-    """Return what the pages' code says, a singular for both numbers, and the words and care of shipped protocols."""
+    """Return what the pages' code says, a singular for both numbers, the words and care of shipped protocols, and the
+    care of limits.
+    """
     written = (*WRITTEN, *DANCED)
     found = [one[1] for path, method in written for one in extract_from_file(method, path, keywords=KEYWORDS)]
     code = {one if isinstance(one, str) else one[0] for one in found}
@@ -52,7 +54,9 @@ def sentences() -> set[str]:
     words = {one for group in cues.values() for _, *texts in group.values() for one in texts}
     plans = [read_plan(name) for name in names("protocols/dances")]
     asked = {one for plan in plans for one in (plan.whom, *plan.care)}
-    return code | words | asked | set(posture_phrases())
+    limits = (path.read_text(encoding="utf-8") for path in (folder("protocols") / "limits").glob("*.toml"))
+    care = {one for text in limits for one in tomllib.loads(text).get("care", ())}
+    return code | words | asked | care | set(posture_phrases())
 
 
 def catalogue(language: str) -> Catalog:

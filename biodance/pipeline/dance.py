@@ -220,13 +220,21 @@ def _names(segments: Iterable[str]) -> str:
     return ", ".join(map(display.spaced, segments))
 
 
-def not_safe(dance: Dance) -> tuple[str, ...]:
-    """Return what imprecise people lack in a dance, a sentence for each limit; none where it is safe."""
+def not_safe(dance: Dance, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
+    """Return what imprecise people lack in a dance, a sentence for each limit in the language of ``say``; none where
+    it is safe.
+    """
     words = {f"{limit.name}_{OF_PERFORMERS}": one.words for limit, one in for_imprecise(family()).items()}
     return tuple(
-        f"NOT SAFE when imprecise: {-100 * m.worst:.1f} cm of the {words.get(m.limit, m.limit)} that is needed are "
-        f"missing at {m.where_s:.0f} s ({display.spaced(m.what)}) for the worst of {PERFORMER_COUNT} simulated "
-        f"people. Try another seed or an easier protocol."
+        say(
+            "NOT SAFE when imprecise: %(size)s cm of the %(what)s that is needed are missing at %(second)s s "
+            "(%(where)s) for the worst of %(count)s simulated people. Try another seed or an easier protocol.",
+            size=number(-100 * m.worst, 1),
+            what=say(words.get(m.limit, m.limit)),
+            second=number(m.where_s, 0),
+            where=say(display.spaced(m.what)),
+            count=number(PERFORMER_COUNT, 0),
+        )
         for m in dance.unsafe
     )
 

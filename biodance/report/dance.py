@@ -93,7 +93,7 @@ def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:
         hold=words.short(float(np.max(dance.hold))),
         about=before_cues(result, say, words.number),
         care=[say(one) for one in dance.care],
-        unsafe=not_safe(dance),
+        unsafe=not_safe(dance, say, words.number),
         cues=cues,
     )
 
@@ -244,7 +244,11 @@ def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Pa
         tuple(say(stance_words(s)) for s in dance.stances),
         tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
         names=tuple(posture_said(name, say) for name in dance.names),
-        about=(*not_safe(dance), *(say(one) for one in dance.care), *before_cues(result, say, words.number)),
+        about=(
+            *not_safe(dance, say, words.number),
+            *(say(one) for one in dance.care),
+            *before_cues(result, say, words.number),
+        ),
         rests=rests(dance),
         say=say,
         short=words.short,

@@ -162,7 +162,9 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / _RATE)))
     plan = found.dance.motion(played.wrench.rate).q[rows]
     cop = played.wrench.cop()[rows]
-    height = max(float(outline[:, 1].max()) for _, outline, _ in silhouettes(body, plan[0], _VIEWS[0][1]))
+    # the tallest posture fits into the picture: a dance may begin bent, and end with arms overhead
+    tall = (silhouettes(body, q, _VIEWS[0][1]) for q in plan[:: max(1, len(plan) // 60)])
+    height = max(float(outline[:, 1].max()) for parts in tall for _, outline, _ in parts)
     scale = _SCALE * _TALL / max(height, 0.2)
     frames = [
         _picture(body, (("planned", planned), ("played", real)), point, float(t), scale)

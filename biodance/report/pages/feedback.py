@@ -222,6 +222,7 @@ def write_feedback(
     if unsafe and not despite:
         raise BiodanceError(f"{' '.join(unsafe)} Or give --despite: then there is a page, which says this on top.")
     words = read_language(language)
+    unsafe = not_safe(dance, words.say, words.number)
     scene, carried = scene_of(dance, words.say), bundle()
     scene["follow"] = follow_scene(dance) if carried else None
     page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe, dance.care, words)
