@@ -35,7 +35,7 @@ class Reason(StrEnum):
     TOLERANCES_DO_NOT_HOLD = "tolerances do not hold"
     """The markers move more on the body than where tolerances were learned."""
     CONTRADICTED = "contradicted"
-    """What the simulation would name is contradicted by Newton, or rests on a single step."""
+    """What the simulation would name is contradicted by Newton or by kept data, or rests on a single step."""
     NOT_SURE = "not sure"
     """That something matters is more probable than not, and no cause is probable enough to be named."""
     UNUSUAL_BODY = "unusual body"

@@ -53,7 +53,7 @@ _WHY: dict[Reason, tuple[str, str]] = {
     Reason.ONLY_STANDING: ("standing still tells little", _SQUATS),
     Reason.UNDESCRIBED_JOINTS: ("what is usual of some joints of this body is not known yet", _REFERENCE),
     Reason.TOLERANCES_DO_NOT_HOLD: ("the markers move unusually much on the body", "Check how they are fixed."),
-    Reason.CONTRADICTED: ("what the forces resemble rests on one step or is contradicted", "Record more steps."),
+    Reason.CONTRADICTED: ("what the forces resemble rests on one step or is contradicted", "Record more movement."),
     Reason.NOT_SURE: ("something may be, and no cause of it is sure", "Record more movement."),
     Reason.UNUSUAL_BODY: ("the forces fit only an unusual body, or a load or mass that nobody noted", _REFERENCE),
     Reason.OUTSIDE_TOLERANCES: ("something that is small elsewhere is large here", _REFERENCE),
