@@ -187,7 +187,7 @@ _SENTENCES = {
     Reason.LIMIT_BROKEN: "No cause was found for what is outside its limit: {about}.",
     Reason.UNDESCRIBED_JOINTS: "The body moves at joints ({about}) for which nobody has learned yet what is usual.",
     Reason.TOLERANCES_DO_NOT_HOLD: "Its markers move more on the body than where tolerances were learned.",
-    Reason.CONTRADICTED: "What the forces resemble rests on a single step, or kept data, or force and trunk contradict it.",
+    Reason.CONTRADICTED: "What the forces resemble rests on one step, or kept data, or force and trunk contradict it.",
     Reason.NOT_SURE: "That something is wrong is more probable than not, and no cause of it is sure.",
 }
 
