@@ -110,6 +110,10 @@ STANDARD_GRAVITY = 9.80665
 """m/s² (CGPM 1901); 1 kilogram-force is so many newtons."""
 COP_FORCE = 20.0
 """N: with less vertical force on a plate its centre of pressure has no meaning."""
+FORCE_DOWN = 20.0
+"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
+the same).
+"""
 TOUCH_FORCE = 30.0
 """N: a plate that carries less over 0.1 s is only trembling; its readings decide nothing about its sign or zero."""
 

@@ -144,3 +144,17 @@ def test_the_chosen_cutoff_is_that_of_the_forces() -> None:
 def test_a_cutoff_above_half_the_marker_rate_is_refused() -> None:
     with pytest.raises(TrialRefused, match=r"Trial walk: The cut-off 60 Hz is not below half"):
         prepare(replace(trial(), settings=Settings().changed({"filter.cutoff": 60})))
+
+
+def test_a_plate_says_when_it_was_loaded_though_the_low_pass_smears_it() -> None:
+    """A heel strikes with 250 N in 5 ms at 0.7 s; a flicker at 1 s is none, and what goes on at the end has no end."""
+    given = trial()
+    plate, time = given.plates[0], given.plates[0].wrench.time
+    force = np.interp(time, [0.7, 0.705, 1.2, 1.3, 1.6, 1.605], [0, 250, 700, 0, 0, 250], left=0)
+    force[(time > 1.0) & (time < 1.02)] = 0
+    value = np.zeros((time.size, 6))
+    value[:, 2] = force
+    (ready,) = prepare(replace(given, plates=(replace(plate, wrench=Wrench(time, value)),))).plates
+    assert ready.loaded == pytest.approx(np.array([[0.7004, 1.3 - 0.1 * 20 / 700]]), abs=1e-4)
+    smeared = ready.wrench.force[:, 2] > 20
+    assert ready.wrench.time[smeared][0] < 0.695

@@ -1,11 +1,13 @@
 """A foot comes down where the force passes 20 N, and only where that is the foot's own force."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from biodance.cycles.cut import foot_events
 from biodance.motion.contact import Contact
-from biodance.records import Wrench
+from biodance.records import Plate, Wrench
 
 TIME = np.arange(200) / 100
 
@@ -20,7 +22,8 @@ def walked(*, measured=True, shared=False):
     on[:, 1, 0] = shared
     sure = np.full(200, measured)
     contact = Contact(TIME, on.any(axis=2), on, sure, np.zeros((200, 2)), (), np.stack([sure, sure], axis=1))
-    return {"right_foot": Wrench(TIME, value), "left_foot": Wrench(TIME, np.zeros((200, 6)))}, contact
+    plates = [Plate(name, 2, np.zeros((4, 3)), Wrench(TIME, 0 * value)) for name in ("plate1", "plate2")]
+    return {"right_foot": Wrench(TIME, value), "left_foot": Wrench(TIME, np.zeros((200, 6)))}, contact, plates
 
 
 def test_a_step_is_one_strike_and_one_off():
@@ -36,10 +39,20 @@ def test_what_is_not_measured_or_shared_tells_no_event():
 
 
 def test_a_flicker_is_no_event():
-    feet, contact = walked()
+    feet, contact, plates = walked()
     value = np.array(feet["right_foot"].value)
     value[80, 2], value[20, 2] = 0.0, 400.0
-    assert [event.time for event in foot_events(feet | {"right_foot": Wrench(TIME, value)}, contact)] == [
+    assert [event.time for event in foot_events(feet | {"right_foot": Wrench(TIME, value)}, contact, plates)] == [
         pytest.approx(0.392),
         pytest.approx(1.208),
     ]
+
+
+def test_where_the_recorded_force_passes_the_threshold_it_tells_when():
+    """Of the plate under the foot, near by: not of the other one, and not of another step."""
+    feet, contact, plates = walked()
+    own = replace(plates[0], loaded=[[0.10, 0.20], [0.41, 1.19]])
+    strike, off = foot_events(feet, contact, [own, replace(plates[1], loaded=[[0.391, 1.21]])])
+    assert (strike.time, off.time) == (0.41, 1.19)
+    far = foot_events(feet, contact, [replace(own, loaded=[[0.1, 0.2]]), plates[1]])
+    assert far == foot_events(feet, contact, plates)

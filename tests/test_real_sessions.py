@@ -49,7 +49,7 @@ def near_what_vicon_says(moved):
     """Events and joint angles of a real walk lie where the software of its laboratory puts them."""
     for one in moved.file_events:
         assert one.missed <= 1
-        assert abs(one.late) < 0.025
+        assert abs(one.late) < 0.012
     limits = {"hip_flexion": (8.0, 0.95), "knee_flexion": (6.0, 0.97), "ankle_dorsiflexion": (5.0, 0.95)}
     found = {one.joint.partition("_")[2]: one for one in moved.file_angles}
     for joint, (offset, correlation) in limits.items():

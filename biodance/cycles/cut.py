@@ -1,6 +1,6 @@
 """A trial cut into what repeats: events of the feet, gait cycles of each foot, squats, rises from a chair, jumps."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -12,7 +12,8 @@ from biodance.body.body import Body
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
-from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Wrench, runs
+from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Plate, Wrench, runs
+from biodance.settings import FORCE_DOWN
 
 # Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
 # and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
@@ -22,19 +23,17 @@ from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion,
 # faces in that frame, so that turns and treadmills are walked, too. The body follows the markers, so that a marker that
 # is lost for a moment costs no event.
 
-FORCE_DOWN = 20.0
-"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
-the same).
-"""
 _SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
 
 
-def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
+def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[Plate]) -> tuple[FootEvent, ...]:
     """Return when each foot came down on a plate or left it, in the order of time.
 
     ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `FORCE_DOWN`,
     between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
-    plate: a force that two feet share tells nothing of one.
+    plate: a force that two feet share tells nothing of one. Those forces are low-passed, which tells a sudden strike up
+    to 34 ms early: where one of the ``plates`` under the foot passes it as recorded, too (`Plate.loaded`), that
+    instant counts.
     """
     events = []
     for foot, side in enumerate(SIDES):
@@ -50,6 +49,10 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
             # Straight line between the two frames; clipped, since shorter contacts were filled in.
             share = (FORCE_DOWN - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
+            under = contact.on_plate[i, foot] | contact.on_plate[i + 1, foot]
+            ends = (plate.loaded[:, 0 if loaded[i + 1] else 1] for plate, on in zip(plates, under, strict=True) if on)
+            recorded = min((s for some in ends for s in some), key=lambda s: abs(s - time), default=np.inf)
+            time = recorded if abs(recorded - time) < _TOGETHER else time
             events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
     return tuple(sorted(events, key=lambda event: event.time))
 

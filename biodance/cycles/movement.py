@@ -351,7 +351,7 @@ def trial_movement(
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
-    force = cut.foot_events(feet, contact) if contact is not None and feet is not None else ()
+    force = cut.foot_events(feet, contact, trial.plates) if contact is not None and feet is not None else ()
     markers = cut.kinematic_events(body, motion)
     events = cut.replaced_events(cut.joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())

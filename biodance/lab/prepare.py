@@ -16,7 +16,7 @@ from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import BRIDGED, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import of_postures
 from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
-from biodance.settings import FilterKind, FilterSettings, GapSettings, Settings
+from biodance.settings import FORCE_DOWN, FilterKind, FilterSettings, GapSettings, Settings
 
 USUAL_CUTOFF = 10.0
 """Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
@@ -238,6 +238,7 @@ def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers,
 def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
+    plate = replace(plate, loaded=_loaded(wrench))
     if of_postures(wrench.time):
         how = "not filtered, every row is a posture"
     elif wrench.time.size < 2 or wrench.time.size < filtering.shortest(wrench.rate):
@@ -251,6 +252,25 @@ def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -
         return replace(plate, wrench=wrench, decisions=(*plate.decisions, f"{how}; no markers, own times kept."))
     value, sampled = _sample(wrench, markers.time)
     return replace(plate, wrench=Wrench(markers.time, value), decisions=(*plate.decisions, f"{how}; {sampled}."))
+
+
+_SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
+
+
+def _loaded(wrench: Wrench) -> Array:
+    """Return (n, 2) s between which the vertical force exceeds `FORCE_DOWN`, linearly between two samples; only what
+    both begins and ends in the recording.
+    """
+    time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
+    down = force > FORCE_DOWN
+    # Gaps first, then contacts: a flicker joins the contact that it interrupts.
+    for value in (False, True):
+        for start, stop in runs(down == value):
+            if start > 0 and stop < down.size and time[stop] - time[start] < _SHORTEST:
+                down[start:stop] = not value
+    ends = np.array([one for one in runs(down) if one[0] > 0 and one[1] < down.size], dtype=int).reshape(-1, 2)
+    share = np.clip((FORCE_DOWN - force[ends - 1]) / (force[ends] - force[ends - 1]), 0, 1)
+    return np.asarray(time[ends - 1] + share * (time[ends] - time[ends - 1]))
 
 
 def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:

@@ -380,6 +380,9 @@ class Plate:
     put : array_like or None
         (2,) m where the point of its moments was put by the feet that stand on it; None where the file or the analyst
         says the place.
+    loaded : array_like
+        (n, 2) s from when until when the vertical force as recorded exceeded `settings.FORCE_DOWN`, once prepared: a
+        low-pass smears the sudden beginning of a step to up to 34 ms before it.
 
     Examples
     --------
@@ -397,11 +400,12 @@ class Plate:
     foot: str = ""
     columns: str = ""
     put: Array | None = None
+    loaded: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         put = None if self.put is None else frozen_array(self.put, (2,), f"{self.name}.put")
         assign(self, decisions=tuple(self.decisions), put=put)
-        freeze(self, self.name, corners=(4, 3), zero=(3,))
+        freeze(self, self.name, corners=(4, 3), zero=(3,), loaded=(None, 2))
 
     @property
     def tared(self) -> bool:
