@@ -114,6 +114,8 @@ FORCE_DOWN = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
 the same).
 """
+SHORTEST_CONTACT = 0.05
+"""s: a shorter contact of a foot, or a shorter time without, is noise."""
 TOUCH_FORCE = 30.0
 """N: a plate that carries less over 0.1 s is only trembling; its readings decide nothing about its sign or zero."""
 

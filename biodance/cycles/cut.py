@@ -13,7 +13,7 @@ from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
 from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Plate, Wrench, runs
-from biodance.settings import FORCE_DOWN
+from biodance.settings import FORCE_DOWN, SHORTEST_CONTACT
 
 # Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
 # and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
@@ -22,8 +22,6 @@ from biodance.settings import FORCE_DOWN
 # ground for 60 to 80 ms more, so that toes which have risen by `_OFF_GROUND` have left, too. Ahead is where the pelvis
 # faces in that frame, so that turns and treadmills are walked, too. The body follows the markers, so that a marker that
 # is lost for a moment costs no event.
-
-_SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
 
 
 def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[Plate]) -> tuple[FootEvent, ...]:
@@ -41,7 +39,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
         # Over the same plate at the same time.
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
-        shortest = _SHORTEST * wrench.rate
+        shortest = SHORTEST_CONTACT * wrench.rate
         loaded = _without_short(np.nan_to_num(force) > FORCE_DOWN, shortest)
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):

@@ -16,7 +16,7 @@ from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import BRIDGED, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import of_postures
 from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
-from biodance.settings import FORCE_DOWN, FilterKind, FilterSettings, GapSettings, Settings
+from biodance.settings import FORCE_DOWN, SHORTEST_CONTACT, FilterKind, FilterSettings, GapSettings, Settings
 
 USUAL_CUTOFF = 10.0
 """Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
@@ -254,9 +254,6 @@ def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -
     return replace(plate, wrench=Wrench(markers.time, value), decisions=(*plate.decisions, f"{how}; {sampled}."))
 
 
-_SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
-
-
 def _loaded(wrench: Wrench) -> Array:
     """Return (n, 2) s between which the vertical force exceeds `FORCE_DOWN`, linearly between two samples; only what
     both begins and ends in the recording.
@@ -266,7 +263,7 @@ def _loaded(wrench: Wrench) -> Array:
     # Gaps first, then contacts: a flicker joins the contact that it interrupts.
     for value in (False, True):
         for start, stop in runs(down == value):
-            if start > 0 and stop < down.size and time[stop] - time[start] < _SHORTEST:
+            if start > 0 and stop < down.size and time[stop] - time[start] < SHORTEST_CONTACT:
                 down[start:stop] = not value
     ends = np.array([one for one in runs(down) if one[0] > 0 and one[1] < down.size], dtype=int).reshape(-1, 2)
     share = np.clip((FORCE_DOWN - force[ends - 1]) / (force[ends] - force[ends - 1]), 0, 1)
