@@ -268,7 +268,7 @@ def test_without_a_finding_its_size_goes_and_the_others_are_fitted_again() -> No
     assert less.named[0].effect == one.named[0].effect
 
 
-def test_what_kept_data_refute_is_not_there_and_what_else_explains_it_stands_in_its_place() -> None:
+def test_what_kept_data_refute_is_not_there_and_what_else_explains_it_may_be() -> None:
     one = inferred(body(), windows(1, trials=2, hidden=offset(12.0)), tolerances=known(), effects=FAST)
     seen = set()
     while one.diagnosis.findings:
