@@ -8,7 +8,7 @@ import pytest
 
 from biodance.cycles.cut import jumps
 from biodance.cycles.strides import lift
-from biodance.records import Wrench
+from biodance.records import Plate, Wrench
 
 RATE, WEIGHT, G = 100.0, 600.0, 9.81
 TIME = np.arange(0, 4, 1 / RATE)
@@ -37,12 +37,14 @@ def feet_high(lift_left: float = 0.0) -> np.ndarray:
 KNOWN = np.ones((TIME.size, 2), dtype=bool)
 
 
-def found(height: np.ndarray, soles: np.ndarray, *, feet: Any = None, known: np.ndarray = KNOWN) -> tuple:
+def found(
+    height: np.ndarray, soles: np.ndarray, *, feet: Any = None, known: np.ndarray = KNOWN, plates: tuple = ()
+) -> tuple:
     motion = SimpleNamespace(time=TIME, rate=RATE, determined=np.ones(TIME.size, dtype=bool))
     outline = np.zeros((TIME.size, 2, 3, 3))
     outline[..., 2] = soles[:, :, None]
     centre = np.stack([0 * TIME, 0 * TIME, height], axis=1)
-    return jumps("jump", motion, SimpleNamespace(outline=outline), centre, feet, known)
+    return jumps("jump", motion, SimpleNamespace(outline=outline), centre, feet, known, plates)
 
 
 def feet(right: np.ndarray, left: np.ndarray) -> dict[str, Wrench]:
@@ -67,6 +69,18 @@ def test_the_plates_tell_when_the_feet_leave_the_ground_and_land() -> None:
     assert one.end == pytest.approx(OFF + FLIGHT + 0.035, abs=0.01)
     (one,) = found(path(), feet_high(), feet=feet(force, force), known=~KNOWN)
     assert one.off == pytest.approx(OFF, abs=0.02)
+
+
+def test_the_recorded_force_tells_when_a_low_passed_one_is_early_and_late() -> None:
+    """The right foot leaves last and lands first, each on a plate of its own; other contacts do not count."""
+    force = np.where((TIME > OFF + 0.03) & (TIME < OFF + FLIGHT - 0.03), 0.0, 300.0)
+    loaded = [[0.2, OFF + 0.004], [OFF + FLIGHT + 0.001, 3.5]], [[0.2, OFF - 0.01], [OFF + FLIGHT + 0.02, 3.5]]
+    plates = tuple(
+        Plate(f"plate{k}", 2, np.zeros((4, 3)), feet(force, force)["right_foot"], loaded=own)
+        for k, own in enumerate(loaded)
+    )
+    (one,) = found(path(), feet_high(), feet=feet(force, force), plates=plates)
+    assert (one.off, one.end) == (OFF + 0.004, OFF + FLIGHT + 0.001)
 
 
 def test_height_flight_depth_and_share_are_those_put_in() -> None:

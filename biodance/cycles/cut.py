@@ -48,11 +48,18 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
             share = (FORCE_DOWN - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
             under = contact.on_plate[i, foot] | contact.on_plate[i + 1, foot]
-            ends = (plate.loaded[:, 0 if loaded[i + 1] else 1] for plate, on in zip(plates, under, strict=True) if on)
-            recorded = min((s for some in ends for s in some), key=lambda s: abs(s - time), default=np.inf)
-            time = recorded if abs(recorded - time) < _TOGETHER else time
+            own = _recorded(float(time), [plate for plate, on in zip(plates, under, strict=True) if on], loaded[i + 1])
+            time = own[np.argmin(np.abs(own - time))] if own.size else time
             events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
     return tuple(sorted(events, key=lambda event: event.time))
+
+
+def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
+    """Return the instants (n,) s near ``time`` at which the force on some ``plates``, as recorded, begins (``down``) or
+    ends.
+    """
+    ends = np.concatenate([plate.loaded[:, 0 if down else 1] for plate in plates]) if plates else np.zeros(0)
+    return np.asarray(ends[np.abs(ends - time) < _TOGETHER])
 
 
 def _without_short(loaded: Mask, shortest: float) -> Mask:
@@ -335,13 +342,15 @@ def jumps(
     centre: Array,
     feet: Mapping[str, Wrench] | None,
     known: Mask,
+    plates: Sequence[Plate],
 ) -> tuple[Cycle, ...]:
     """Return the jumps of a trial; ``centre`` (T, 3) m of mass.
 
     A jump leaves the ground with both feet and comes down as high as it left. It begins where the centre of mass starts
     to go down before it, or, after a flight (a drop, another jump), with that landing; ``off`` is the take-off;
     it ends with the landing. Both are where the force of both ``feet`` passes `FORCE_DOWN` in frames in which it is
-    ``known`` (T, 2), else where the soles are `_OFF_GROUND` over the ground.
+    ``known`` (T, 2), as recorded on all ``plates`` (`Plate.loaded`), else where the soles are `_OFF_GROUND` over the
+    ground.
     """
     from scipy.signal import find_peaks
 
@@ -354,7 +363,7 @@ def jumps(
     if feet is None:
         return tuple(found)
     total = feet["right_foot"].force[:, 2] + feet["left_foot"].force[:, 2]
-    return tuple(_by_force(one, time, total, np.asarray(known.all(axis=1))) for one in found)
+    return tuple(_by_force(one, time, total, np.asarray(known.all(axis=1)), plates) for one in found)
 
 
 def _flight(sole: Array, top: int, near: int, determined: Mask) -> tuple[int, int, int] | None:
@@ -392,7 +401,7 @@ def _cycle(trial: str, time: Array, height: Array, flight: tuple[int, int, int])
     return Cycle(trial, "jump", "both", float(time[landed + high[-1]]), float(time[down]), float(time[off]))
 
 
-def _by_force(cycle: Cycle, time: Array, total: Array, sure: Mask) -> Cycle:
+def _by_force(cycle: Cycle, time: Array, total: Array, sure: Mask, plates: Sequence[Plate]) -> Cycle:
     """Return a jump with take-off and landing where the force tells them."""
     ends = {}
     for name, at, falls in (("off", cycle.off, True), ("end", cycle.end, False)):
@@ -402,6 +411,9 @@ def _by_force(cycle: Cycle, time: Array, total: Array, sure: Mask) -> Cycle:
         if passes:
             i = min(passes, key=lambda k: abs(time[k] - at))
             share = (FORCE_DOWN - total[i]) / (total[i + 1] - total[i])
-            ends[name] = float(time[i] + share * (time[i + 1] - time[i]))
+            passed = float(time[i] + share * (time[i + 1] - time[i]))
+            own = _recorded(passed, plates, down=not falls)
+            # In the air from when the last plate is left to when the first one is met.
+            ends[name] = float(own.max() if falls else own.min()) if own.size else passed
     off, end = ends.get("off", cycle.off), ends.get("end", cycle.end)
     return Cycle(cycle.trial, cycle.kind, cycle.side, cycle.start, end, off)

@@ -356,7 +356,7 @@ def trial_movement(
     events = cut.replaced_events(cut.joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
     known_of_feet, shared = _known_feet(contact, motion.time.size)
-    jumped = cut.jumps(trial.name, motion, soles, centre, feet, known_of_feet)
+    jumped = cut.jumps(trial.name, motion, soles, centre, feet, known_of_feet, trial.plates)
     lifts = (one for one in cut.repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*cut.gait_cycles(trial.name, events), *lifts, *jumped)
     cycles = tuple(one for one in found if not cut.is_left_out(one, trial.left_out))

@@ -255,8 +255,8 @@ def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -
 
 
 def _loaded(wrench: Wrench) -> Array:
-    """Return (n, 2) s between which the vertical force exceeds `FORCE_DOWN`, linearly between two samples; only what
-    both begins and ends in the recording.
+    """Return (n, 2) s between which the vertical force exceeds `FORCE_DOWN`, linearly between two samples; NaN where
+    that began before the recording or went on after it.
     """
     time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
     down = force > FORCE_DOWN
@@ -265,9 +265,13 @@ def _loaded(wrench: Wrench) -> Array:
         for start, stop in runs(down == value):
             if start > 0 and stop < down.size and time[stop] - time[start] < SHORTEST_CONTACT:
                 down[start:stop] = not value
-    ends = np.array([one for one in runs(down) if one[0] > 0 and one[1] < down.size], dtype=int).reshape(-1, 2)
-    share = np.clip((FORCE_DOWN - force[ends - 1]) / (force[ends] - force[ends - 1]), 0, 1)
-    return np.asarray(time[ends - 1] + share * (time[ends] - time[ends - 1]))
+    ends = np.array(runs(down), dtype=int).reshape(-1, 2)
+    seen = (ends > 0) & (ends < down.size)
+    at = ends[seen]
+    share = np.clip((FORCE_DOWN - force[at - 1]) / (force[at] - force[at - 1]), 0, 1)
+    found = np.full(ends.shape, np.nan)
+    found[seen] = time[at - 1] + share * (time[at] - time[at - 1])
+    return found
 
 
 def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:

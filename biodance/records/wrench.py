@@ -381,8 +381,8 @@ class Plate:
         (2,) m where the point of its moments was put by the feet that stand on it; None where the file or the analyst
         says the place.
     loaded : array_like
-        (n, 2) s from when until when the vertical force as recorded exceeded `settings.FORCE_DOWN`, once prepared: a
-        low-pass smears the sudden beginning of a step to up to 34 ms before it.
+        (n, 2) s from when until when the vertical force as recorded exceeded `settings.FORCE_DOWN` (NaN: before or
+        after the recording), once prepared: a low-pass smears the sudden beginning of a step to up to 34 ms before it.
 
     Examples
     --------
