@@ -39,7 +39,8 @@ class Centres:
     ``across`` side -> (3,) m, horizontal, to the right of the foot; ``sole`` side -> (3,), upwards, square to the
     sole, the vertical without it; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts
     pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a movement placed; ``contradicted``
-    the joints whose place here the movement contradicts. ``mid_hip`` (3,) m, where pelvis and trunk are taken to
+    the joints whose place here the movement contradicts, ``unshown`` those that a movement was asked for and does not
+    show. ``mid_hip`` (3,) m, where pelvis and trunk are taken to
     begin, None for the middle of the hip centres: one hip alone that lies elsewhere does not move the matter of the
     pelvis.
     """
@@ -54,6 +55,7 @@ class Centres:
     notes: tuple[str, ...]
     errors: tuple[JointError, ...] = ()
     contradicted: tuple[str, ...] = ()
+    unshown: tuple[str, ...] = ()
     mid_hip: Array | None = None
     sole: _Places = field(default_factory=dict)
 

@@ -41,11 +41,11 @@ from biodance.motion.ik.joint_unknowns import (
     JointUnknowns,
     centre_sd,
     doubted,
-    excited,
     knees_elsewhere,
     own_centre,
     own_turn,
     own_unknowns,
+    unshown,
 )
 from biodance.motion.kinematics import chains, place_jacobian, poses
 from biodance.motion.track import hold_open
@@ -117,12 +117,12 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
     # Distance per axis (a third of the square) or skin, whichever is more; sqrt(alike) for dependent postures.
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
-    shown = excited(scaling.centres, start.theta, start.information)
-    found, refused = _inside_the_body(scaling, postures, start, shown, noise=noise)
+    held = unshown(scaling.centres, start.theta, start.information)
+    scaling, found, refused = _inside_the_body(_holding(scaling, held), postures, start, noise=noise)
     spared: dict[str, tuple[str, float]] = {}
     for _ in range(_FAULTS):
         cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise, alike=alike)
-        wrong = elsewhere(scaling, found.theta, cost, slopes, shown)
+        wrong = elsewhere(scaling, found.theta, cost, slopes)
         if wrong is None:
             break
         if wrong.marker:
@@ -133,33 +133,36 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
             postures = replace(postures, xyz=xyz)
         else:
             scaling = replace(scaling, centres=doubted(scaling.centres, (*scaling.centres.contradicted, wrong.joint)))
-            shown[own_unknowns(wrong.joint)] = True
-        again = evaluate_joints(scaling, postures, found.theta, found.q, noise=noise)
-        found, beyond = _inside_the_body(scaling, postures, again, shown, noise=noise)
+        scaling, found, beyond = _inside_the_body(scaling, postures, found, noise=noise)
         refused |= beyond
-    return _told(scaling, start, found, shown, spared, refused)
+    return _told(scaling, start, found, spared, refused)
 
 
 def _inside_the_body(
-    scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
-) -> tuple[CalibrationState, dict[str, float]]:
-    """Return the fit over the unknowns ``shown`` (37,) without the joints that it would put outside the body
-    (`FARTHEST`), which stay where the static trial puts them and are taken out of ``shown``; joint -> m how far it
-    would go. A joint that the movement contradicts is another matter: it is named.
+    scaling: Scaling, postures: Markers, start: CalibrationState, *, noise: float
+) -> tuple[Scaling, CalibrationState, dict[str, float]]:
+    """Return the fit from ``start`` on without the joints that it would put outside the body (`FARTHEST`), which stay
+    where the static trial puts them: ``scaling`` that holds these, too, and joint -> m how far it would go. A joint
+    that the movement contradicts is another matter: it is named.
     """
     refused: dict[str, float] = {}
     while True:
-        found = fit_joints(scaling, postures, start, shown, noise=noise)
+        start = evaluate_joints(scaling, postures, start.theta, start.q, noise=noise)
+        found = fit_joints(scaling, postures, start, noise=noise)
         far = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS}
         beyond = {j: m for j, m in far.items() if m > FARTHEST and j not in scaling.centres.contradicted}
         if not beyond:
-            return found, refused
+            return scaling, found, refused
         worst = max(beyond, key=lambda joint: beyond[joint])
         refused[worst] = beyond[worst]
-        shown[own_unknowns(worst)] = False
         theta = start.theta.copy()
         theta[own_unknowns(worst)] = 0.0
-        start = evaluate_joints(scaling, postures, theta, start.q, noise=noise)
+        scaling, start = _holding(scaling, (*scaling.centres.unshown, worst)), replace(start, theta=theta)
+
+
+def _holding(scaling: Scaling, joints: tuple[str, ...]) -> Scaling:
+    """Return the ``scaling`` that holds ``joints`` where the static trial puts them."""
+    return replace(scaling, centres=replace(scaling.centres, unshown=joints))
 
 
 _NOBODY = (
@@ -195,7 +198,6 @@ def _told(
     scaling: Scaling,
     start: CalibrationState,
     found: CalibrationState,
-    shown: NDArray[np.bool_],
     spared: Mapping[str, tuple[str, float]],
     refused: Mapping[str, float],
 ) -> _FunctionalJoints:
@@ -203,7 +205,7 @@ def _told(
     # Laplace: inverse of the information at the minimum.
     covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
-    kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
+    kept = scaling.centres.unshown
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
@@ -223,7 +225,7 @@ def _told(
     notes += [_outside(joint, far) for joint, far in refused.items()]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
-    notes += knees_elsewhere(scaling.centres, found.theta, found.information, shown, known=(*wrong, *spared))
+    notes += knees_elsewhere(scaling.centres, found.theta, found.information, known=(*wrong, *spared))
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return _FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))

@@ -4,7 +4,7 @@ Golub and Pereyra 1973, DOI 10.1137/0710036; docs/derivations.md).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
+from biodance.body.human.static_centres import Centres
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
-from biodance.motion.ik.joint_unknowns import FAULTY, SIZE, JointUnknowns, own_unknowns
+from biodance.motion.ik.joint_unknowns import FAULTY, SIZE, JointUnknowns, doubted
 from biodance.motion.ik.slides import with_slides, without_slides
 from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.records import Array, Index, Markers
@@ -62,36 +63,30 @@ def elsewhere(
     theta: Array,
     cost: tuple[Array, Array],
     markers: MarkerSlopes,
-    shown: NDArray[np.bool_],
 ) -> _Elsewhere | None:
     """Return what most probably lies elsewhere; None where nothing is more probable by `_MORE_PROBABLE`.
 
-    ``theta`` (37,) the unknowns found, ``cost`` its gradient (37,) and information (37, 37) there, those ``shown``
-    (37,) free.
+    ``theta`` (37,) the unknowns found, ``cost`` its gradient (37,) and information (37, 37) there.
     """
     wrong = scaling.centres.contradicted
-    found = [_Elsewhere(_joint(scaling, theta, cost, shown, one), joint=one) for one in JOINTS if one not in wrong]
-    free = np.flatnonzero(shown)
+    found = [_Elsewhere(_joint(scaling.centres, theta, cost, one), joint=one) for one in JOINTS if one not in wrong]
+    free = JointUnknowns(scaling.centres).free
     found += [_Elsewhere(value, marker=name) for name, value in _markers(cost, markers, free).items()]
     best = max(found, key=lambda one: one.log_bayes_factor)
     return best if best.log_bayes_factor >= _MORE_PROBABLE else None
 
 
-def _joint(scaling: Scaling, theta: Array, cost: tuple[Array, Array], shown: NDArray[np.bool_], joint: str) -> float:
+def _joint(centres: Centres, theta: Array, cost: tuple[Array, Array], joint: str) -> float:
     """Return the log Bayes factor of a fault at a joint."""
     gradient, information = cost
-    usual = JointUnknowns(scaling.centres).prior(theta)
-    doubted = replace(scaling.centres, contradicted=(*scaling.centres.contradicted, joint))
-    faulty = JointUnknowns(doubted).prior(theta)
-    freed = np.array(shown)
-    freed[own_unknowns(joint)] = True
+    sound, wrong = JointUnknowns(centres), JointUnknowns(doubted(centres, (*centres.contradicted, joint)))
+    usual, faulty = sound.prior(theta), wrong.prior(theta)
     # Gradient and information with another prior: the old prior's part out, the new one's in.
     moved = (
         gradient + faulty[1].T @ faulty[0] - usual[1].T @ usual[0],
         information + faulty[1].T @ faulty[1] - usual[1].T @ usual[1],
     )
-    before = _evidence(*cost, usual, np.flatnonzero(shown))
-    return _evidence(*moved, faulty, np.flatnonzero(freed)) - before
+    return _evidence(*moved, faulty, wrong.free) - _evidence(*cost, usual, sound.free)
 
 
 def _evidence(gradient: Array, information: Array, prior: tuple[Array, Array], free: Index) -> float:
@@ -294,11 +289,9 @@ def _left_open(coordinates: Array, slope: Array) -> Array:
     )
 
 
-def fit_joints(
-    scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
-) -> CalibrationState:
-    """Return the minimum over the ``shown`` unknowns: Gauss-Newton, steps halved where the cost would rise."""
-    at, chosen = start, np.flatnonzero(shown)
+def fit_joints(scaling: Scaling, postures: Markers, start: CalibrationState, *, noise: float) -> CalibrationState:
+    """Return the minimum over the free unknowns: Gauss-Newton, steps halved where the cost would rise."""
+    at, chosen = start, JointUnknowns(scaling.centres).free
     if not chosen.size:
         return at
     for _ in range(_STEPS):

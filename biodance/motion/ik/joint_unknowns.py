@@ -5,7 +5,6 @@ turn about the bone; which of them a movement shows, and of which it contradicts
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from biodance.body.body import Body
@@ -13,7 +12,7 @@ from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres, static_sd
 from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import Poses, below, chains, poses
-from biodance.records import SIDES, Array
+from biodance.records import SIDES, Array, Index
 from biodance.records.attention import Doubt
 from biodance.spatial import axis_rotation, skew
 
@@ -60,6 +59,12 @@ class JointUnknowns:
     """The unknowns theta (37,) about the static trial's ``centres``, theta = 0."""
 
     centres: Centres
+
+    @property
+    def free(self) -> Index:
+        """Return the unknowns of the joints that the movement shows; the others are where the static trial has them."""
+        own = (i for joint in JOINTS if joint not in self.centres.unshown for i in own_unknowns(joint))
+        return np.array(sorted(own), dtype=int)
 
     def bone(self, hinge: str) -> Array:
         """Return the unit vector (3,), lab, upwards along the bone above a hinge."""
@@ -108,8 +113,10 @@ class JointUnknowns:
             for side, sign in (("right", 1.0), ("left", -1.0)):
                 ends = [f"{side}_{joint}" for joint in (upper, lower)]
                 wrong = [centre_sd(end, contradicted=True) for end in ends if end in self.centres.contradicted]
-                # A contradicted end may be off itself: its own standard deviation is added.
-                sd[row] = np.linalg.norm([sd[row], *wrong])
+                held = [static_sd(end) for end in ends if end in self.centres.unshown]
+                # A contradicted end may be off itself, and one that stays where the static trial puts it is as far off
+                # as static trials are: its own standard deviation is added.
+                sd[row] = np.linalg.norm([sd[row], *wrong, *held])
                 above, below = (self.centres.place[end] + theta[own_centre(end)] for end in ends)
                 length = np.linalg.norm(below - above)
                 # Slope of the length: unit vector along the limb, at either end with opposite sign.
@@ -186,27 +193,33 @@ kept, because what little the markers say of such a joint is soft tissue.
 """
 
 
-def excited(centres: Centres, theta: Array, information: Array) -> NDArray[np.bool_]:
-    """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share
-    ``_EXCITED``, from the ``information`` (37, 37) at ``theta``.
+def unshown(centres: Centres, theta: Array, information: Array) -> tuple[str, ...]:
+    """Return the joints of whose standard deviation the movement removes less than the share ``_EXCITED``, from the
+    ``information`` (37, 37) at ``theta``.
 
     A hinge is judged by its axis.
     """
     slope = JointUnknowns(centres).prior(theta)[1]
     # Standard deviations by the prior alone, and with the movement.
     before, after = (np.sqrt(np.diag(np.linalg.inv(known))) for known in (slope.T @ slope, information))
-    out = np.zeros(SIZE, dtype=bool)
-    for joint in JOINTS:
-        judged = [own_turn(joint)] if joint in HINGES else list(range(SIZE))[own_centre(joint)]
-        out[own_unknowns(joint)] = np.linalg.norm(after[judged]) < (1 - _EXCITED) * np.linalg.norm(before[judged])
-    return out
+    judged = {joint: [own_turn(joint)] if joint in HINGES else own_unknowns(joint) for joint in JOINTS}
+    return tuple(
+        joint
+        for joint, own in judged.items()
+        if np.linalg.norm(after[own]) >= (1 - _EXCITED) * np.linalg.norm(before[own])
+    )
 
 
 def doubted(centres: Centres, wrong: tuple[str, ...]) -> Centres:
     """Return the ``centres`` with the joints that are ``wrong``; one hip alone leaves the middle of the hips there."""
     hips = [centres.place[f"{side}_hip"] for side in SIDES]
     alone = sum(joint.endswith("_hip") for joint in wrong) == 1
-    return replace(centres, contradicted=wrong, mid_hip=np.mean(hips, axis=0) if alone else None)
+    return replace(
+        centres,
+        contradicted=wrong,
+        unshown=tuple(joint for joint in centres.unshown if joint not in wrong),
+        mid_hip=np.mean(hips, axis=0) if alone else None,
+    )
 
 
 def own_unknowns(joint: str) -> list[int]:
@@ -230,20 +243,16 @@ def mismarked(far: float) -> float:
     return float(expit(logit(MISMARKED) - np.log(FAULTY) + far**2 / 2 * (1 - FAULTY**-2)))
 
 
-def knees_elsewhere(
-    centres: Centres, theta: Array, information: Array, shown: NDArray[np.bool_], *, known: tuple[str, ...]
-) -> tuple[str, ...]:
+def knees_elsewhere(centres: Centres, theta: Array, information: Array, *, known: tuple[str, ...]) -> tuple[str, ...]:
     """Return a warning for every knee whose axis the movement shows elsewhere than the static trial, where it is more
     probable than not that it was marked elsewhere.
 
     Parameters
     ----------
     centres : Centres
-        Joints as the static trial has them.
+        Joints as the static trial has them, and which of them the movement does not show.
     theta, information : Array
         (37,) m, rad: the unknowns found; (37, 37) what prior and movement together say of them.
-    shown : NDArray
-        (37,) unknowns that the movement shows; the others are where the static trial has them.
     known : tuple of str
         Joints of which something is said already.
 
@@ -252,12 +261,12 @@ def knees_elsewhere(
     tuple of str
         Sentences that begin with "Warning".
     """
-    free, slope = np.flatnonzero(shown), JointUnknowns(centres).prior(theta)[1]
+    unknowns = JointUnknowns(centres)
+    free, slope = unknowns.free, unknowns.prior(theta)[1]
     before, after = (np.linalg.inv(one[np.ix_(free, free)]) for one in (slope.T @ slope, information))
     notes = []
-    for knee in (hinge for hinge in HINGES if hinge.endswith("_knee") and hinge not in known):
-        if not shown[own_turn(knee)]:
-            continue
+    told = (*known, *centres.unshown)
+    for knee in (hinge for hinge in HINGES if hinge.endswith("_knee") and hinge not in told):
         ways = _ways(centres, knee)
         ahead, turned = ways @ theta
         # Variance of the posterior mean: what the data took off the prior's.
