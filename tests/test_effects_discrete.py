@@ -197,6 +197,15 @@ def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
     assert slow == (), "100 Hz cannot show it"
 
 
+@pytest.mark.parametrize("lines", [(59.7,), tuple(np.arange(44.0, 68.0, 3.2))], ids=["a motor", "a runner's steps"])
+def test_a_line_beside_the_mains_and_a_comb_of_steps_are_no_hum(lines: tuple[float, ...]) -> None:
+    local = wrench_about_point(standing(np.random.default_rng(6), seconds=20.0), CORNERS.mean(axis=0))
+    for frequency in lines:
+        local[:, 4] += 2 * np.sin(2 * np.pi * frequency * np.arange(len(local)) / 1000)
+    value = wrench_about_origin(local, CORNERS.mean(axis=0))
+    assert failed(discrete_effects()["mains_hum"].check(recorded(value))) == []
+
+
 @pytest.mark.parametrize("pair", [("LKNE", "RKNE"), ("LELB", "RELB")])
 def test_swapped_labels_are_named(pair: tuple[str, str]) -> None:
     case = human_case(120)

@@ -10,8 +10,14 @@ from biodance.spatial import wrench_about_point
 MAINS = (50.0, 60.0)
 _LEAST = np.array([2.0, 2.0, 2.0, 0.6, 0.6, 0.6])
 """N, N·m: a smaller amplitude harms nothing."""
-_CLEARLY = 10.0
-"""How far the line must stand over its neighbours."""
+_CLEARLY = 3.0
+"""Times the largest amplitude beside it by which the line must stand out: steps at an even pace make a comb of lines, a
+motor lines of its own (59.7 Hz of a treadmill, 1.1 N·m).
+"""
+_WANDERS = 0.1
+"""Hz: grids are held to within 0.05 Hz of 50 and 60 (ENTSO-E), seldom farther than 0.1."""
+_BESIDE = 8.0
+"""Hz on either side with which the line is compared."""
 _SECONDS = 2.0
 
 
@@ -67,17 +73,15 @@ def lines(trial: Trial) -> dict[tuple[str, float], float]:
             continue
         channels = wrench_about_point(plate.wrench.value, plate.centre)
         for frequency in MAINS:
-            amplitude, around = line(channels, plate.wrench.rate, frequency)
+            amplitude, beside = line(channels, plate.wrench.rate, frequency)
             for k, name in enumerate(CHANNELS):
                 target = name if len(trial.plates) == 1 else f"{plate.name}:{name}"
-                found[target, frequency] = float(amplitude[k]) if amplitude[k] > _CLEARLY * around[k] else 0.0
+                found[target, frequency] = float(amplitude[k]) if amplitude[k] > _CLEARLY * beside[k] else 0.0
     return found
 
 
 def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
-    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median of the spectrum 2 to 8 Hz
-    beside it.
-    """
+    """Return the amplitude (n,) of the line at ``frequency``, and the largest one beside it."""
     window = np.hanning(len(values))
     spectrum = (
         2
@@ -86,7 +90,9 @@ def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
         / window.sum()
     )
     away = np.abs(np.fft.rfftfreq(len(values), 1 / rate) - frequency)
-    return spectrum[away < 0.7].max(axis=0), np.median(spectrum[(away > 2) & (away < 8)], axis=0)
+    # Half the width of a line under this window: two bins.
+    own = away < _WANDERS + 2 * rate / len(values)
+    return spectrum[own].max(axis=0), spectrum[~own & (away < _BESIDE)].max(axis=0)
 
 
 def _fast_enough(rate: float, samples: int) -> bool:
