@@ -1,5 +1,6 @@
 """Faults of forces too large for gates and statistics: found before them, undone in a copy, and nothing else named."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from two_plates import changed, exchanged, foreign, late, session, weak
 from biodance.effects import Recorded
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
+from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.session import examine
@@ -55,6 +57,20 @@ def test_a_mass_is_wrong_only_where_one_was_declared(declared, monkeypatch):
     result = examined_beside(replace(visit, subject=subject))
     assert any(one.effect == "body_mass" for one in diagnose_session(result).findings) is declared
     assert any(one.effect == "body_mass" for one in diagnose_session(result, effects=["body_mass"]).findings)
+
+
+def test_plates_that_weighed_the_person_are_held_against_each_other_alone(data, tmp_path):
+    """Nobody declared a mass; plate 1 reads 30 % too little and weighs the person with plate 2, which is no name."""
+    for name in ("static1", "squats1", "walking1"):
+        for file in (data / "subject4").glob(f"{name}[._]*"):
+            shutil.copy(file, tmp_path)
+    visit = changed(read_session(tmp_path), lambda plates: weak(plates[::-1])[::-1])
+    assert "mass" in visit.subject.guessed
+    (static,) = visit.of_role("static")
+    weighed = static.wrench.value[:, 2].mean() / static.settings.gravity
+    found = diagnose_session(examine(replace(visit, subject=replace(visit.subject, mass=weighed))))
+    for one in found.findings:
+        assert any(target.startswith("plate1") for target in [one.target, *(alias.target for alias in one.set)])
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.2, 0.4])

@@ -9,8 +9,10 @@ from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
 from biodance.records import Array
 
-_WRONG = 0.3
-"""Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all."""
+WRONG = 0.3
+"""Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all. A guess,
+or what plates weigh that are under test themselves, has it as its standard deviation.
+"""
 _LEAST = 0.3
 """kg that matter: clinic scale and clothes, 0.2 kg."""
 _USUAL = 0.01
@@ -74,8 +76,8 @@ class BodyMass(Effect):
         return (case.predicted / case.phi[::10].sum())[:, :, None]
 
     def possible_in(self, case: Case, theta: Array) -> bool:
-        """Return whether a scale or a form can be so wrong: by at most `_WRONG` of the person's mass."""
-        return bool(abs(theta[0]) <= _WRONG * case.body.sip.mass.sum())
+        """Return whether a scale or a form can be so wrong: by at most `WRONG` of the person's mass."""
+        return bool(abs(theta[0]) <= WRONG * case.body.sip.mass.sum())
 
 
 EFFECT = BodyMass
