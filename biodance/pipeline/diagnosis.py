@@ -183,8 +183,8 @@ def _suspects(effects: Chosen[Effect | DiscreteEffect], result: SessionResult) -
 
 
 def _beside_guesses(known: Tolerances, subject: Subject, asked: Mapping[str, Cause]) -> Tolerances:
-    """Return the tolerances of a session whose ``subject`` may weigh anything where nobody said the mass, if that is not
-    what is ``asked``: what plates weighed that are under test themselves is no evidence against one of them.
+    """Return the tolerances of a session whose ``subject`` may weigh anything where nobody said the mass, if that is
+    not what is ``asked``: what plates weighed that are under test themselves is no evidence against one of them.
     """
     if "mass" not in subject.guessed or BodyMass.name in asked:
         return known

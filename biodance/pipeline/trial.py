@@ -18,14 +18,15 @@ from biodance.identification.statistics import believable, standing_point
 from biodance.lab.c3d.subject import NO_OUTPUTS, read_outputs
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import report_gaps
-from biodance.lab.prepare import prepare
+from biodance.lab.markers.time_axis import of_postures
+from biodance.lab.prepare import motion_filter, prepare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.dynamics import compare, predict_wrench
 from biodance.motion.newton import quiet_standing
 from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.track import Followed, asked_cutoff, with_cutoff
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit
-from biodance.records import LeftOut, Motion, Sip, Trial, runs
+from biodance.records import LeftOut, Mask, Motion, Sip, Trial, runs
 from biodance.records.attention import seconds_left_out
 
 T = TypeVar("T")
@@ -113,6 +114,16 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
     return soles_from_markers(markers, read_marker_set(trial.marker_set))
 
 
+def at_an_end(trial: Trial, motion: Motion) -> Mask:
+    """Return (T,) the frames of a movement within half a period of the cut-off from its first or last one: what lies
+    beyond is made up by the low-pass, and so is a part of their acceleration.
+    """
+    if trial.role == "static" or of_postures(motion.time):
+        return np.zeros(motion.time.size, dtype=bool)
+    reach = 0.5 / motion_filter(trial.settings).cutoff
+    return (motion.time < motion.time[0] + reach) | (motion.time > motion.time[-1] - reach)
+
+
 def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
     """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured
     frames. Raises TrialRefused: no frame is fully measured; the message says why.
@@ -125,10 +136,11 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
             f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared."
         )
     # a posture that the markers leave open is a guess, and so are the accelerations made of it
-    chosen = contact.measured & motion.determined
+    chosen = contact.measured & motion.determined & ~at_an_end(trial, motion)
     if not chosen.any():
         raise TrialRefused(
-            f"Trial {trial.name}: in no fully measured frame do the markers fix the posture. See the gaps of the trial."
+            f"Trial {trial.name}: in no fully measured frame away from its ends do the markers fix the posture. "
+            "See the gaps of the trial."
         )
     agreement = compare(measured, simulated, chosen)
     known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
@@ -199,7 +211,9 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
     """Return how many seconds each gate takes out of the comparison of the wrenches of a trial."""
     if one.motion is None or one.motion.time.size < 2:
         return {}
-    masks, fit = {**contact.left_out, LeftOut.POSTURE_OPEN: np.logical_not(one.motion.determined)}, trial_fit(one)
+    masks, fit = dict(contact.left_out), trial_fit(one)
+    masks[LeftOut.POSTURE_OPEN] = np.logical_not(one.motion.determined)
+    masks[LeftOut.AT_AN_END] = at_an_end(one.trial, one.motion)
     if fit is not None:
         # gates in their order: frames that forces contradict, then what is left in runs too short to judge
         kept = believable(body, fit, standing_point((fit,)))[0].use

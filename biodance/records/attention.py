@@ -30,6 +30,8 @@ class LeftOut(StrEnum):
     """A foot rests on a plate that reads nothing."""
     POSTURE_OPEN = "posture_open"
     """The markers do not fix the posture."""
+    AT_AN_END = "at_an_end"
+    """Beside an end of the recording the low-pass makes up the acceleration."""
     FORCES_DIFFER = "forces_differ"
     """Plates and motion differ by more than a wrong body or soft tissue can make of this movement."""
     SHORT_RUN = "short_run"
