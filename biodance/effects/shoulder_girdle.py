@@ -33,7 +33,6 @@ class ShoulderGirdle(MissingJoint):
             "rad",
             0.05,
             "half the angle: where the joint lies and what hangs on it is known to a half",
-            least=_LEAST,
         ),
     )
     separated_by = "Shrugging alone, with hanging arms."

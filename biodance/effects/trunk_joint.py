@@ -42,7 +42,6 @@ class TrunkJoint(MissingJoint):
             "rad",
             0.03,
             "half the angle: where the joint lies and what hangs on it is known to a half",
-            least=_LEAST,
         ),
     )
     separated_by = "Rounding and arching the back alone, standing still."
