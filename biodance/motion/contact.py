@@ -112,7 +112,8 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
 
 def share_lacking(trial: Trial, *, weight: float) -> Array:
     """Return (T,) which share of the ``weight`` N the plates lack of what pelvis and trunk (else all markers) need to
-    move as they do; zero where nothing tells it: no markers or weight, forces that are unknown.
+    move as they do; zero where nothing tells it: no markers or weight, forces that are unknown, half a parabola from an
+    end of the recording.
     """
     from scipy.signal import savgol_filter
 
@@ -128,7 +129,9 @@ def share_lacking(trial: Trial, *, weight: float) -> Array:
     height = markers.xyz[:, trunk if trunk.any() else whole, 2].mean(axis=1)
     # By Newton F / (m g) = 1 + a / g; the second derivative of a parabola through `frames` samples.
     needed = 1 + savgol_filter(height, frames, 2, deriv=2, delta=step) / trial.settings.gravity
-    return np.nan_to_num(needed - total / weight)
+    lacks = np.nan_to_num(needed - total / weight)
+    lacks[: frames // 2] = lacks[-(frames // 2) :] = 0.0
+    return lacks
 
 
 def _on(trial: Trial, *segments: str) -> Mask:
