@@ -2,6 +2,8 @@
 
 import shutil
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +12,16 @@ from shared_markers import examined_beside
 from two_plates import changed, exchanged, foreign, late, session, weak
 
 from biodance.effects import Recorded
+from biodance.effects.frame_rate import FrameRate
+from biodance.effects.plate_gain import PlateGain
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.session import examine
+from biodance.records import Wrench
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
@@ -116,6 +122,44 @@ def test_forces_of_another_trial_are_never_fine(monkeypatch):
     found = diagnosed(monkeypatch, foreign, "squat_1")
     assert ("unrelated_forces", "", ("squat_1",)) in names(found)
     assert next(row for row in found.diagnosis.judged if row.trial == "squat_1").seconds == 0
+
+
+@pytest.mark.parametrize("beside", ["static", "squat_2"])
+def test_a_plate_that_a_trial_lacks_stops_nothing(beside, monkeypatch):
+    """As where a reader leaves out a dead plate: a third one, on which nobody stands, is in one trial alone."""
+    far = replace(session().trials[0].plates[0], name="plate3", corners=two_plates.HALF + np.array([2.0, 0, 0]))
+    quiet = Wrench(far.wrench.time, two_plates.NOISE * np.random.default_rng(5).normal(size=far.wrench.value.shape))
+    found = diagnosed(monkeypatch, lambda plates: (*plates, replace(far, wrench=quiet)), beside)
+    assert names(found) == []
+    assert found.diagnosis.status == "clean"
+
+
+WALKS = [("biomechzoo/HC044A", "HC044A15"), ("c3d_parser_QCMAS", "QCMAS.dynamic"), ("c3d_parser_Sydney", "S4-AMGait04")]
+
+
+@pytest.mark.parametrize(("folder", "name"), WALKS)
+def test_large_delays_of_real_walks_are_named_with_their_size(folder: str, name: str, data: Path) -> None:
+    visit = read_session(data / folder)
+    for seconds in (0.1, 0.2):
+        failed = [one for one in TimeDelay.check(Recorded(changed(visit, late(seconds), name))) if not one.ok]
+        assert [one.size for one in failed] == [pytest.approx(seconds, abs=0.015)]
+
+
+def test_a_real_plate_that_reads_seven_tenths_in_one_trial_is_named_and_no_clock(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Deep squats, in which the pelvis goes back by more than a step; the body alone would ask for another rate."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    for source in sorted((data / "subject4").iterdir()):
+        if source.stem.removesuffix("_grf") in ("static1", "squats1", "squatsAsym1"):
+            (tmp_path / source.name).symlink_to(source)
+    visit = read_session(tmp_path)
+    for number in (None, 1, 2):
+        change = [partial(weak, number=number), "squats1"] if number else [lambda plates: plates]
+        seen = recorded_of(examined_beside(changed(visit, *change)))
+        failed = [(one.target, one.trials) for one in PlateGain.check(seen) if not one.ok]
+        assert failed == ([(f"plate{number}", ("squats1",))] if number else [])
+        assert all(one.ok for one in FrameRate.check(seen))
 
 
 def test_what_is_undone_is_the_recording_again():

@@ -67,6 +67,16 @@ def test_a_load_is_no_clock(segment: str, kilograms: float) -> None:
     assert failed(discrete_effects()["frame_rate"].check(session_of(loaded, loaded))) == []
 
 
+def test_a_rate_that_one_trial_alone_asks_for_is_no_rate() -> None:
+    """The cameras have one rate: beside a trial whose forces fit, another one's accelerations are something else."""
+    case = human_case(600)
+    motion = Motion(case.motion.time / 2, case.motion.q, 2 * case.motion.v, 4 * case.motion.a)
+    plate = replace(case.trial.plates[0], wrench=Wrench(motion.time, case.trial.plates[0].wrench.value))
+    wrong = replace(case, motion=motion, trial=replace(case.trial, plates=(plate,)))
+    assert failed(FrameRate._rate([wrong, wrong])) == [("frame_rate", "")]
+    assert failed(FrameRate._rate([wrong, case])) == []
+
+
 def test_lost_frames_are_named() -> None:
     case = human_case(600)
     plate, lost = case.trial.plates[0], 6

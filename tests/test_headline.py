@@ -5,12 +5,14 @@ import re
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from example_results import LEFT, VERDICTS
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, STRANGE, DiagnosisStatus, Reason
-from biodance.effects import causes
+from biodance.effects import QualityCheck, causes
 from biodance.pipeline.attention import headline
 from biodance.records.attention import Attention, Judged
 
@@ -35,6 +37,7 @@ TARGETS = {
     "lab_tilt": "x", "axis_error": "plate1:corners", "plate_crosstalk": "plate2:Fz->Mx", "plate_position": "plate12:y",
     "plate_rotation": "plate2:z", "time_delay": "plate2", "clipping": "plate2:Fz", "mains_hum": "plate2:Fz",
 }  # fmt: skip
+PROVEN = Gain(np.ones(6), np.zeros(6), (0.2, 0.4), ("squat",))
 ALSO = (
     Alias("plate_crosstalk", "plate2:Fz->Mx", 9.0),
     Alias("body_mass", "", 8.0),
@@ -94,18 +97,18 @@ def test_every_headline_is_short_plain_and_has_one_thing_to_do(judged: tuple[Jud
         (
             Finding(
                 "time_delay", "plate2", (Estimate("delay", 0.0212, 0.0015, "s"),),
-                (Alias("time_delay", "plate2", 9.0),), 1.0,
+                (Alias("time_delay", "plate2", 9.0),), 1.0, PROVEN,
             ),
             "The forces of plate 2 are 21 ms late (18 to 24). Shift the forces, or accept the correction.",
         ),
         (
             Finding("time_delay", "", (Estimate("delay", -0.0336, 0.0039, "s"),), (Alias("time_delay", "", 9.0),), 1.0),
-            "The forces are 34 ms early (26 to 41). Shift the forces, or accept the correction.",
+            "The forces are 34 ms early (26 to 41). Shift the forces.",
         ),
         (
             Finding(
                 "plate_gain", "plate4:Fz", (Estimate("gain", -0.24, 0.0065, "1"),),
-                (Alias("plate_gain", "plate4:Fz", 9.0), Alias("body_mass", "", 8.0)), 1.0,
+                (Alias("plate_gain", "plate4:Fz", 9.0), Alias("body_mass", "", 8.0)), 1.0, PROVEN,
             ),
             "Fz of plate 4 reads 24 % too little (23 to 25), or it is a wrong body mass. "
             "Calibrate the plate, or accept the correction.",
@@ -128,7 +131,8 @@ def test_exchanged_labels_are_told_in_one_breath() -> None:
     labels = tuple(
         Finding("labels_swapped", f"L{a}/R{a}", (), (Alias("labels_swapped", a, 9.0),), 1.0) for a in ("FIN", "WRA")
     )
-    said = headline(Diagnosis(False, labels), (STATIC,), frozenset({"static"}))
+    checks = tuple(QualityCheck("labels of the markers", False, "", one.effect, one.target) for one in labels)
+    said = headline(Diagnosis(False, labels, checks=checks), (STATIC,), frozenset({"static"}))
     assert (
         said.text == "LFIN and RFIN, LWRA and RWRA carry each other's names. Exchange them, or accept the correction."
     )

@@ -65,6 +65,16 @@ def test_30_ms_written_in_are_seen_as_30(data):
         assert told(moved(trial, 0.03)).lag - told(trial).lag == pytest.approx(0.03, abs=0.002)
 
 
+@pytest.mark.parametrize("folder", ["c3d_parser_FMC", "c3d_parser_Sydney"])
+def test_half_a_step_names_no_large_delay(folder, data):
+    """Less than 0.4 s on the plates, 0.2 to 0.4 s late: other bends of the force go with the trunk, 0.1 s early."""
+    for trial in recorded(data / folder).trials:
+        for seconds in (0.2, 0.3, 0.4):
+            found = told(moved(trial, seconds))
+            if found is not None and abs(found.lag) > 0.06:
+                assert found.lag == pytest.approx(seconds, abs=0.02), (trial.name, seconds)
+
+
 def test_a_chair_that_carries_along_says_by_itself_that_nothing_can_be_told(data):
     one = recorded(data / "subject4")
     for name in ("STS1", "STSAsym1", "STSweakLegs1"):

@@ -9,8 +9,9 @@ from inferred_sessions import heard
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
+from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
-from biodance.observations import recording
+from biodance.observations import observe, recording
 from biodance.observations.stride_force import StrideForce
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
@@ -27,6 +28,15 @@ def spoiled(session: Path, folder: Path, text: str) -> Path:
 
 def named_in(folder: Path) -> tuple[Finding, ...]:
     return heard(read_session(folder)).diagnosis.findings
+
+
+def test_who_stands_with_one_foot_beside_plates_of_unknown_place_weighs_nothing(data: Path) -> None:
+    """A plate of a table that measures nothing is left out; what the other foot pushes sideways is no zero."""
+    trial = read_trial(data / "subject4/static1.trc", role="static")
+    told = ["standing_force", "standing_place", "standing_twist"]
+    assert {one.observer for one in observe(recording(trial, mass=60.05), told)} == set(told)
+    for plate in trial.plates:
+        assert observe(recording(replace(trial, plates=(plate,)), mass=30.0), told) == ()
 
 
 @pytest.mark.parametrize("name", ["HC038A", "HC050A"])

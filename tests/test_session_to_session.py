@@ -15,11 +15,12 @@ from biodance.body.body import body_text
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain
+from biodance.effects import QualityCheck
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.identification import identify_body
 from biodance.pipeline.body import starting_from
 from biodance.pipeline.front_dance import virtual_subject
-from biodance.pipeline.results import SessionDiagnosis
+from biodance.pipeline.results import MendedCopy, SessionDiagnosis
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.trial_result import trial_fit
 from biodance.records import Session, Subject
@@ -111,6 +112,7 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
     turned = replace(place, effect="plate_rotation", target="plate1:z", gain=replace(proven, ci95=(-0.1, 0.2)))
     unmeasured = replace(turned, target="plate1:x", gain=None)
     found = SessionDiagnosis(Diagnosis(explained=True, findings=(place, zero, load, turned, unmeasured)))
+    (tmp_path / "again").mkdir()
     told, files = _accepted(replace(session_result(), session=session), found, tmp_path, ())
     assert told["trials"] == ("t",)
     assert told["not_in_recordings"] == []
@@ -131,6 +133,14 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
         == "taken off: plate position plate1:x (shift 0.03 m); plate offset Fx (offset 5 N or N·m)"
     )
     assert "rotation" not in (tmp_path / "corrected" / "corrected.toml").read_text()
+    late = QualityCheck("clock of the forces", False, "In t the forces come 200 ms late.", "time_delay", trials=("t",))
+    other = replace(wrong, name="u", source=replace(wrong.source, path=Path("u.c3d")))
+    copy = replace(found, diagnosis=Diagnosis(explained=True, findings=()), mended=MendedCopy({}, (late,)))
+    two = replace(session_result(), session=replace(session, trials=(wrong, other)))
+    said = {one["file"]: one["what"] for one in _accepted(two, copy, tmp_path / "again", ())[0]["written"]}
+    assert said["corrected/t.c3d"] == "taken off: In t the forces come 200 ms late."
+    assert said["corrected/u.c3d"] == "as read: nothing was taken off"
+    assert late.text in (tmp_path / "again" / "corrected" / "corrected.toml").read_text()
     assert "plate_position" in files["lab.toml"]
     assert "plate_offset" not in files["lab.toml"]  # of today only
     assert sorted(path.name for path in (tmp_path / "corrected").iterdir()) == [

@@ -66,24 +66,24 @@ def changed(one: Session, change, *names: str) -> Session:
 
 def late(seconds: float):
     """Return a change: all samples come so much later; before the first one somebody stands as in it."""
-    count = round(seconds * FINE)
 
     def change(plates: tuple[Plate, ...]) -> tuple[Plate, ...]:
         rng = np.random.default_rng(9)
-        return tuple(
-            replace(p, wrench=Wrench(p.wrench.time, np.concatenate([before(p, rng), p.wrench.value[:-count]])))
-            for p in plates
-        )
+        return tuple(replace(p, wrench=Wrench(p.wrench.time, delayed(p.wrench, rng))) for p in plates)
 
-    def before(plate: Plate, rng: np.random.Generator) -> np.ndarray:
-        return plate.wrench.value[:20].mean(axis=0) + NOISE * rng.normal(size=(count, 6))
+    def delayed(wrench: Wrench, rng: np.random.Generator) -> np.ndarray:
+        count = round(seconds * wrench.rate)
+        before = wrench.value[:20].mean(axis=0) + NOISE * rng.normal(size=(count, 6))
+        return np.concatenate([before, wrench.value[:-count]])
 
     return change
 
 
-def weak(plates: tuple[Plate, ...]) -> tuple[Plate, ...]:
-    """Let plate 2 read 0.7 of everything."""
-    return plates[0], replace(plates[1], wrench=Wrench(plates[1].wrench.time, 0.7 * plates[1].wrench.value))
+def weak(plates: tuple[Plate, ...], number: int = 2) -> tuple[Plate, ...]:
+    """Let plate 2 (or that of another ``number``) read 0.7 of everything."""
+    wrong = plates[number - 1]
+    wrong = replace(wrong, wrench=Wrench(wrong.wrench.time, 0.7 * wrong.wrench.value))
+    return (*plates[: number - 1], wrong, *plates[number:])
 
 
 def exchanged(plates: tuple[Plate, ...]) -> tuple[Plate, ...]:

@@ -50,7 +50,7 @@ class BodyMass(Effect):
     )
     words = CauseWords(
         "the person weighs {size} {more} than declared{between}",
-        f"Weigh again, {ACCEPT}",
+        f"Weigh again{ACCEPT}",
         "a wrong body mass",
         ("more", "less"),
         entry=SessionEntry.MASS,

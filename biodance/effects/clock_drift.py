@@ -49,7 +49,7 @@ class ClockDrift(Effect):
         settled_by="A long session and by a trial repeated at the end.",
     )
     words = CauseWords(
-        "the clocks of cameras and plates drift {size}{between} apart", f"Use one clock, {ACCEPT}", "a drifting clock"
+        "the clocks of cameras and plates drift {size}{between} apart", f"Use one clock{ACCEPT}", "a drifting clock"
     )
     explains = (CheckKind.FORCES,)
 

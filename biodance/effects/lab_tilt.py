@@ -31,7 +31,7 @@ class LabTilt(Effect):
         settled_by="Squats (the centre of mass changes height) and by a plumb line with two markers.",
     )
     words = CauseWords(
-        "the laboratory is tilted {size}{between} about {it}", f"Calibrate the cameras, {ACCEPT}", "a tilted floor"
+        "the laboratory is tilted {size}{between} about {it}", f"Calibrate the cameras{ACCEPT}", "a tilted floor"
     )
     explains = (CheckKind.PRESSURE,)
 

@@ -50,7 +50,7 @@ class LabelsSwapped(DiscreteEffect):
     )
     words = CauseWords(
         "{pairs} carry each other's names",
-        f"Exchange them, {ACCEPT}",
+        f"Exchange them{ACCEPT}",
         "exchanged labels",
         entry=SessionEntry.EXCHANGE,
     )

@@ -36,7 +36,7 @@ class PlateDrift(ChannelEffect):
         settled_by="Repeating the first trial at the end and by unloaded recordings before and after.",
     )
     words = CauseWords(
-        "{it} drifts by {size}{between} over the session", f"Zero the plate before each trial, {ACCEPT}", "a drift"
+        "{it} drifts by {size}{between} over the session", f"Zero the plate before each trial{ACCEPT}", "a drift"
     )
     explains = (CheckKind.FORCES,)
 

@@ -45,7 +45,7 @@ class PlateHysteresis(ChannelEffect):
         settled_by="Loading and unloading in steps with the person standing still between them.",
     )
     words = CauseWords(
-        "{it} comes back late after a load, by {size}{between}", f"Have the plate repaired, {ACCEPT}", "a slow plate"
+        "{it} comes back late after a load, by {size}{between}", f"Have the plate repaired{ACCEPT}", "a slow plate"
     )
 
     def in_channel(self, case: Case) -> Array:

@@ -61,7 +61,7 @@ class PlateOffset(ChannelEffect):
         ),
     )
     words = CauseWords(
-        "{it} reads {size} too {more}{between} all the time", f"Zero the plate, {ACCEPT}", "a wrong zero", TOO_MUCH
+        "{it} reads {size} too {more}{between} all the time", f"Zero the plate{ACCEPT}", "a wrong zero", TOO_MUCH
     )
     explains = (CheckKind.WEIGHT, CheckKind.PRESSURE, CheckKind.FORCES)
     followed = (

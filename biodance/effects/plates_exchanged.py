@@ -49,7 +49,7 @@ class PlatesExchanged(DiscreteEffect):
     )
     words = CauseWords(
         "{it} carry each other's signals",
-        f"Exchange them, {ACCEPT}",
+        f"Exchange them{ACCEPT}",
         "exchanged plates",
         entry=SessionEntry.CHANNELS,
     )

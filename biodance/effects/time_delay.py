@@ -64,7 +64,7 @@ class TimeDelay(Effect):
     )
     words = CauseWords(
         "{forces} {size} {more}{between}",
-        f"Shift the forces, {ACCEPT}",
+        f"Shift the forces{ACCEPT}",
         "a delay",
         ("late", "early"),
         ("forces late", "forces early"),

@@ -29,6 +29,9 @@ TELLS = 0.7
 _BAND = LowPass(order=2, cutoff=6.0)
 """Of force and acceleration: steps and squats are below (Winter 2009, chapter 3), impacts of single limbs above."""
 _FARTHEST, _STEP = 0.5, 0.002  # s: how late or early a force is looked for, and in which steps
+_WHOLE, _NEAR = 0.5, 0.06
+"""s that a step takes, and how far a lag is looked for in less: of half a step every bend of the force looks like
+another one, and only the one beside it is told."""
 _EDGE = 0.1  # s at each end of the markers, which the low-pass makes up
 _LEAST = 0.25  # s without a break that are looked at
 _MOVES = 0.01
@@ -194,7 +197,8 @@ def _lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float,
 
 def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, float, float, float]:
     """Return lag and its sd s (NaN: not told), the correlation there, and the one at no lag."""
-    farthest = min(_FARTHEST, here.size / trunk.rate / 2)
+    lasts = here.size / trunk.rate
+    farthest = min(_FARTHEST, lasts / 2) if lasts >= _WHOLE else _NEAR
     lags = _STEP * np.arange(-round(farthest / _STEP), round(farthest / _STEP) + 1)
     wanted = trunk.acceleration[here] - trunk.acceleration[here].mean()
     found = np.stack([np.interp(trunk.time[here] + lag, time, slow) for lag in lags])

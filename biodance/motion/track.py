@@ -112,8 +112,7 @@ def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[S
     even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
     del values, before, behind, filtered  # what is derived needs the memory
     time = np.arange(even.shape[1]) / rate
-    free = np.zeros(len(even))
-    ends = [(3, free), (4, free)]  # natural: third and fourth derivative vanish
+    ends = [(order, np.zeros(len(even))) for order in (3, 4)]  # natural: third and fourth derivative vanish
     spline = make_interp_spline(time, even.T, k=_DEGREE, bc_type=(ends, ends))
     first, second = spline(time, nu=1).T, spline(time, nu=2).T
     return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
@@ -133,11 +132,9 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
         raise TrialRefused(
             f"Frame {int(bad.argmax())} has no posture (NaN); smooth only frames that the inverse kinematics gave."
         )
-    if len(time) < 2:
+    if len(time) < 2 or of_postures(time):
         return
     steps = np.diff(time)
-    if of_postures(time):
-        return
     if np.ptp(steps) > 0.01 * steps.mean():
         frame = int(np.abs(steps - np.median(steps)).argmax())
         raise TrialRefused(
@@ -192,8 +189,7 @@ def _before_first(angle: Array, vector: Array) -> Array:
 
 _LARGEST_ADDED = np.radians(5.0)
 """rad, the largest standard deviation that missing markers may add to an angle: errors above 5 degrees mislead clinical
-interpretation (systematic review, McGinley et al. 2009, doi:10.1016/j.gaitpost.2008.09.003).
-"""
+interpretation (review: McGinley et al. 2009, doi:10.1016/j.gaitpost.2008.09.003)."""
 _ROOT = (1.0, np.pi / np.sqrt(3))
 """m and rad, standard deviations of the root before any marker is seen: anywhere in the laboratory, turned at will."""
 
@@ -394,9 +390,8 @@ def hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
 
 def _notes(body: Body, found: InverseKinematics) -> tuple[str, ...]:
     frames, names = len(found.q), found.marker_names
-    seen = ~np.isnan(found.residual)
-    rms = np.sqrt(np.mean(found.residual[seen] ** 2))
-    frame, marker = np.unravel_index(np.where(seen, found.residual, -1.0).argmax(), found.residual.shape)
+    rms = np.sqrt(np.nanmean(found.residual**2))
+    frame, marker = np.unravel_index(np.nanargmax(found.residual), found.residual.shape)
     notes = [
         f"Inverse kinematics: {frames} frames, {len(names)} markers, RMS distance {1e3 * rms:.1f} mm, "
         f"largest {1e3 * found.residual[frame, marker]:.1f} mm ({names[marker]}, frame {frame})."
@@ -468,17 +463,22 @@ def own_cutoff(at: Followed, settings: LowPass) -> float | None:
     low, high = max(1.0, _PERIODS * rate / max(markers.time.size, 1)), min(USUAL_CUTOFF, _FASTEST * rate)
     if low >= high:
         return None
-    followed, _ = at.held
-    model = poses(followed, at.found.q)
+    followed, model = at.held[0], poses(at.held[0], at.found.q)
     worn = [k for k, name in enumerate(body.markers.names) if name in markers]
-    unseen = np.array([np.isnan(markers[body.markers.names[k]]).any(axis=1).sum() for k in worn])
+    seen = markers.select(body.markers.names[k] for k in worn).seen
+    unseen = np.sum(~seen, axis=0)
     columns = [k for k, count in zip(worn, unseen, strict=True) if count <= np.median(unseen)]
     placed = followed.n_root + int(followed.free.sum())
     if 3 * len(columns) <= placed:
         return None
     path = markers.select(body.markers.names[k] for k in columns).xyz
     points = model.points([body.markers.segment[k] for k in columns], body.markers.position[columns])
-    power, missed = _power(path), _power(path - points) * 3 * len(columns) / (3 * len(columns) - placed)
+    # Other markers tell another posture: where they come and go the misfit steps, and a step is no noise.
+    _, which, counts = np.unique(seen, axis=0, return_inverse=True, return_counts=True)
+    usual = which.ravel() == counts.argmax()
+    usual |= 2 * counts.max() <= usual.size  # no set of markers tells most frames: all count
+    power, misfit = _power(path), _power(np.where(usual[:, None, None], path - points, np.nan))
+    missed = misfit * 3 * len(columns) / ((3 * len(columns) - placed) * usual.mean())
     frequency = np.arange(1, power.size + 1) * rate / (2 * (power.size + 1))
     fast = frequency > _FASTEST * rate
     noise = missed + max(0.0, float((power - missed)[fast].mean()))

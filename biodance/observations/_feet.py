@@ -8,7 +8,7 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.motion.soles import OUTLINE
-from biodance.records import SIDES, Array, Markers
+from biodance.records import SIDES, Array, Markers, Wrench
 from biodance.records.arrays import rate_of
 
 _UNSEEN = 0.05
@@ -230,3 +230,20 @@ def pelvis_path(markers: Markers | None, known: tuple[str, ...]) -> Array | None
             middle = ((right + left) / 2 + back) / 2
             return middle if np.isfinite(middle).any() else None
     return None
+
+
+_ASIDE = 0.06
+"""m from foot to foot that the pressure of who stands still lies from the pelvis at most: 24 mm seen, 0.1 m and more
+where one foot alone presses."""
+
+
+def pressed_between(feet: tuple[FootPath, ...], total: Wrench, pelvis: Array) -> bool:
+    """Return whether the ``total`` wrench of somebody who stands still lies under the ``pelvis`` (T, 3) m, seen from
+    foot to foot, as far as it is known. Where it lies under one of two ``feet``, the other one is not measured.
+    """
+    pressure = total.cop(height=min((float(np.nanmin(foot.front[:, 2])) for foot in feet), default=0.0))[:, :2]
+    paths = (*(foot.front[:, :2] for foot in feet), pressure, pelvis[:, :2])
+    if len(feet) < 2 or not all(np.isfinite(path).all(axis=1).any() for path in paths):
+        return True
+    left, right, pressed, over = (np.nanmean(path, axis=0) for path in paths)
+    return bool(abs((pressed - over) @ (left - right)) <= _ASIDE * np.linalg.norm(left - right))

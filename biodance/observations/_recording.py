@@ -16,7 +16,7 @@ from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.upright import is_still
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
 from biodance.motion.soles import inside
-from biodance.observations._feet import FootPath, Track, feet_of, median_known, pelvis_path, track_of
+from biodance.observations._feet import FootPath, Track, feet_of, median_known, pelvis_path, pressed_between, track_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
@@ -170,12 +170,12 @@ class SeenTrial:
 
     @cached_property
     def whole(self) -> bool:
-        """Whether nothing of the feet of somebody who stands still reaches beyond the plates, as far as it is known
-        where feet and plates are: what stands beside them is not measured.
+        """Whether nothing of the feet of somebody who stands still reaches beyond the plates, or, where a plate's place
+        is not known, the pressure lies between them, as far as it is known: what stands beside is not measured.
         """
         plates = [plate for plate in self.trial.plates if plate.placed]
         if not self.feet or len(plates) < len(self.trial.plates):
-            return True
+            return self.pelvis is None or pressed_between(self.feet, self.total, self.pelvis)
         soles = [foot.outline(np.linspace(foot.time[0], foot.time[-1], 10)) for foot in self.feet]
         within = [np.max([inside(plate, sole) for plate in plates], axis=0).min(axis=1) for sole in soles]
         return all(not np.nanmedian(one) < -_OUTLINE for one in within if np.isfinite(one).any())

@@ -67,17 +67,23 @@ class Written(NamedTuple):
 
 
 def write_corrected(
-    session: Session, earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrection, ...], folder: Path
+    session: Session,
+    earlier: tuple[PlateCorrection, ...],
+    accepted: tuple[PlateCorrection, ...],
+    folder: Path,
+    *,
+    undone: Iterable[str] = (),
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Write the trials of a session without the causes ``accepted`` as C3D into ``folder``, with the session.toml that
     makes them a session; return their names, and why others could not be written.
 
     Markers and plates are as read (m turned to mm, z up, plates TYPE 2), other analog channels are left out. What was
-    corrected ``earlier`` is in ``session`` already; `APPLIED` says that all of it is off, so that none is corrected
-    twice.
+    corrected ``earlier`` is in ``session`` already, and so is what was ``undone`` in it (a sentence each); `APPLIED`
+    says that all of it is off, so that none is corrected twice.
     """
     folder.mkdir()
-    text = corrections_text(joined_corrections(earlier, accepted))
+    said = "".join(f"# {sentence}\n" for sentence in undone)
+    text = said + corrections_text(joined_corrections(earlier, accepted))
     (folder / APPLIED).write_text(text, encoding="utf-8", newline="\n")
     (folder / "session.toml").write_text(_session_toml(session), encoding="utf-8", newline="\n")
     written, refused = [], []

@@ -114,7 +114,10 @@ def _named(one: Diagnosis) -> Iterator[str]:
     """Yield the first cause with its size, its alternatives and what to do, ever shorter."""
     first = one.faults[0]
     together = tuple(other for other in one.faults[1:] if other.effect == first.effect and names_markers(first))
-    told, more = spoken(first, together), len(one.faults) - len(together)
+    # what a check found is undone in a copy and judged there; all else goes by what it gains on data not used
+    put_right = any((check.effect, check.target) == (first.effect, first.target) for check in one.checks)
+    proven = put_right or (first.gain is not None and first.gain.proven)
+    told, more = spoken(first, together, proven=proven), len(one.faults) - len(together)
     start = "" if more == 1 else f"{more} things are wrong. First, "
     also = alternatives(first)
     rest = ", and more is wrong" if not {Reason.FORCES_LEFT, Reason.UNUSUAL_BODY}.isdisjoint(one.why) else ""

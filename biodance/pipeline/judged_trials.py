@@ -1,6 +1,7 @@
 """Which trials of a session the diagnosis looks at, and why it leaves others out."""
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from biodance.lab.markers.time_axis import of_postures
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import LeftOut, Role
+from biodance.records import LeftOut, Plate, Role, Trial, Wrench
 from biodance.records.attention import Judged
 
 _ENOUGH = 10.0
@@ -34,11 +35,29 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
     seconds = [float(np.ptp(motion.time[[0, -1]])) for _, motion in moving]
     # from 0 to 1 through all trials in turn: what drifts in a session goes on from one to the next
     ends = np.cumsum(seconds)
+    every = {plate.name: plate for one in results for plate in one.trial.plates}
     return tuple(
-        TrialWindow(one.trial, motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1])
+        TrialWindow(
+            _with_every_plate(one.trial, every), motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]
+        )
         for (one, motion), long, end in zip(moving, seconds, ends, strict=True)
         if one.comparison is not None and one.trial.role in roles and one.comparison.used.any()
     )
+
+
+def _with_every_plate(trial: Trial, every: Mapping[str, Plate]) -> Trial:
+    """Return a trial with all plates of its session: one that its reader left out carried nothing there, and what it
+    read is not known, so that no cause of it shows.
+    """
+    own = {plate.name: plate for plate in trial.plates}
+    if not own or own.keys() == every.keys():
+        return trial
+    nothing = Wrench(trial.wrench.time, np.zeros_like(trial.wrench.value))
+    plates = (
+        own.get(name) or replace(plate, wrench=nothing, zero=np.full(3, np.nan), loaded=np.empty((0, 2)))
+        for name, plate in sorted(every.items())
+    )
+    return replace(trial, plates=tuple(plates))
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
@@ -51,8 +70,10 @@ def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
 
 
 def all_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
-    """Return the trials that checks look at: those to look at, and those kept."""
-    return (*chosen_windows(results), *windows(results, KEPT_ROLES))
+    """Return the trials that checks look at: those to look at, and those kept, each once."""
+    chosen = chosen_windows(results)
+    names = {window.trial.name for window in chosen}
+    return (*chosen, *(one for one in windows(results, KEPT_ROLES) if one.trial.name not in names))
 
 
 def cases_of(body: Body | None, found: tuple[TrialWindow, ...]) -> tuple[Case, ...]:

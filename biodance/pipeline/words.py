@@ -78,8 +78,10 @@ class SpokenFinding:
     do: str
 
 
-def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
-    """Return a finding in words; ``others`` of the same effect without a size of their own are told together."""
+def spoken(finding: Finding, others: Sequence[Finding] = (), *, proven: bool = False) -> SpokenFinding:
+    """Return a finding in words; ``others`` of the same effect without a size of their own are told together. Only a
+    correction that is ``proven`` is offered.
+    """
     words, size = finding.cause.words, _size(finding.parameters)
     if words is None:
         name = spaced(finding.effect)
@@ -105,7 +107,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
     }
     where = f" in {listed(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
     plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))
-    return SpokenFinding(plain, fact, words.do)
+    return SpokenFinding(plain, fact, words.do.format(accept=", or accept the correction" if proven else ""))
 
 
 def names_markers(finding: Finding) -> bool:
@@ -119,7 +121,8 @@ def alternatives(finding: Finding) -> list[str]:
     for alias in finding.set[1:]:
         if alias.effect == finding.effect:
             whole, _, channel = alias.target.rpartition(":")
-            named.append(place_in_words(whole if whole and channel in "xyz" else alias.target))
+            place = place_in_words(whole if whole and channel in "xyz" else alias.target)
+            named.append(place.replace("->", " into "))
         else:
             known = alias.cause.words
             named.append(known.alternative if known else f"a {spaced(alias.effect)}")

@@ -1,6 +1,6 @@
 """Write what was found into a folder: the page for the analyst and the numbers for programs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions, now, provenance
 from biodance.pipeline.session import identification_of
 from biodance.pipeline.still import stills_of
+from biodance.records import Session
 from biodance.records.attention import Attention
 from biodance.report.files import write_files, write_results
 from biodance.report.methods import METHODS, methods_text
@@ -184,9 +185,8 @@ def _accepted(
     copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
     files = _accepted_files(found if proven else None, findings, earlier, made, name)
-    rewritten = (*(one.text for one in undone if one.effect != LabelsSwapped.name), *map(str, made))
-    trials, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
-    written = (*copied, *(Written(file, what) for file, (_, what) in files.items()), *_of_trials(trials, rewritten))
+    trials, refused, corrected = _corrected(result.session, undone, made, earlier, folder)
+    written = (*copied, *(Written(file, what) for file, (_, what) in files.items()), *corrected)
     left = _not_applied(findings, proven=proven)
     others = {*left, *((one.effect, one.target) for one in made)}
     document = {
@@ -227,12 +227,28 @@ def _accepted_files(
     return files
 
 
-def _of_trials(trials: tuple[str, ...], changes: tuple[str, ...]) -> list[Written]:
-    """Return what was written of trials with these ``changes``."""
-    told = "; ".join(changes)
-    beside = Written(f"{CORRECTED}/{APPLIED}", f"says what was taken off: {told}")
-    roles = Written(f"{CORRECTED}/session.toml", "subject and roles")
-    return [beside, roles, *(Written(f"{CORRECTED}/{one}.c3d", f"taken off: {told}") for one in trials)] if told else []
+def _corrected(
+    session: Session,
+    undone: Iterable[QualityCheck],
+    made: tuple[PlateCorrection, ...],
+    earlier: tuple[PlateCorrection, ...],
+    folder: Path,
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[Written, ...]]:
+    """Write the trials as corrected, if anything is; return their names, why others were not written, and what was."""
+    put_right = {one.text: one.trials for one in undone if one.effect != LabelsSwapped.name}
+    changes = put_right | {str(one): one.trials for one in made}
+    if not changes:
+        return (), (), ()
+    trials, refused = write_corrected(session, earlier, made, folder / CORRECTED, undone=put_right)
+    written = [
+        Written(f"{CORRECTED}/{APPLIED}", f"says what was taken off: {'; '.join(changes)}"),
+        Written(f"{CORRECTED}/session.toml", "subject and roles"),
+    ]
+    for name in trials:
+        own = [text for text, of in changes.items() if not of or name in of]
+        told = f"taken off: {'; '.join(own)}" if own else "as read: nothing was taken off"
+        written.append(Written(f"{CORRECTED}/{name}.c3d", told))
+    return trials, refused, tuple(written)
 
 
 def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[str, str], str]:

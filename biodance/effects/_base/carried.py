@@ -17,8 +17,9 @@ _LOADED = 0.02
 """Share of the need under which the place of a plate's pressure says nothing: its centre stands for it."""
 
 _STAYS = 0.25
-"""m that the pelvis goes over the floor where nobody steps: less than a step. Whoever walks treads on each plate once,
-and where the pressure lies over one step says nothing of what the plate reads.
+"""m that a foot goes over the floor where nobody steps: less than a step (the pelvis goes back by more in a deep
+squat). Whoever walks treads on each plate once, and where the pressure lies over one step says nothing of what the
+plate reads.
 """
 
 
@@ -42,7 +43,9 @@ def carried_by_plates(case: Case) -> Carried | None:
     trunk = trunk_of(case.trial, mass=float(case.phi[::10].sum())) if len(plates) > 1 else None
     if trunk is None or trunk.covered.size != len(case.predicted) or not trunk.covered.any():
         return None
-    if np.linalg.norm(np.ptp(case.motion.q[trunk.covered, :2], axis=0)) > _STAYS:
+    feet = [k for k, name in enumerate(case.body.segments) if name.endswith("_foot")]
+    ankles = case.poses.points(feet, np.zeros((len(feet), 3)))[trunk.covered, :, :2]
+    if np.linalg.norm(np.ptp(ankles, axis=0), axis=1).max(initial=0.0) > _STAYS:
         return None
     middle = np.mean([plate.centre for plate in plates], axis=0)
     means = [

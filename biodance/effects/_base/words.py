@@ -59,8 +59,9 @@ class CheckKind(StrEnum):
     FORCES = "force difference"
 
 
-ACCEPT = "or accept the correction."
-CALIBRATE = f"Calibrate the plate, {ACCEPT}"
-MEASURE_CORNERS = f"Measure its corners, {ACCEPT}"
+ACCEPT = "{accept}."
+"""Ends what to do where the correction may be accepted instead, once it is proven."""
+CALIBRATE = f"Calibrate the plate{ACCEPT}"
+MEASURE_CORNERS = f"Measure its corners{ACCEPT}"
 RECORD_AGAIN = "Correct it, and run this again."
 TOO_MUCH = ("much", "little")
