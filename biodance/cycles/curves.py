@@ -206,14 +206,15 @@ def load_curves(
         f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))
         for foot, side in enumerate(SIDES)
     }
-    names, rows, given = _moments_and_powers(body, motion, ground)
-    own = [(k, seen) for k, (joint, _) in enumerate(names) if (seen := _seen_from(cycle, joint)) is not None]
+    named = [(joint.name, "moment", [j]) for j, joint in enumerate(body.joints)]
+    named += [(body.joints[axes[-1]].name.rpartition("_")[0], "power", list(axes)) for axes in chains(body)]
+    own = [(kind, axes, seen) for joint, kind, axes in named if (seen := _seen_from(cycle, joint)) is not None]
+    rows, given = _moments_and_powers(body, motion, ground, [(kind, axes) for kind, axes, _ in own])
     # No sharing: the parameters are those of the segments themselves.
-    columns, share = [k for k, _ in own], np.eye(sip.phi.size) if body.sharing is None else body.sharing
-    rows, given, mass = rows[:, columns], given[:, columns], float(sip.mass.sum())
+    share, mass = np.eye(sip.phi.size) if body.sharing is None else body.sharing, float(sip.mass.sum())
     # phi_links = S phi: covariance S C S'.
     variance, covariance = np.empty(given.shape), share @ sip.covariance @ share.T
-    for column in range(len(columns)):  # of the links beyond the joint alone: no other parameter moves it
+    for column in range(len(own)):  # of the links beyond the joint alone: no other parameter moves it
         beyond = np.flatnonzero(rows[:, column].any(axis=0))
         # Columns that are zero at all times need no covariance.
         needs = rows[:, column, beyond]
@@ -221,8 +222,7 @@ def load_curves(
         variance[:, column] = np.sum((needs @ covariance[np.ix_(beyond, beyond)]) * needs, axis=-1)
     # (Y phi - c) / m.
     value, sd = (rows @ (share @ sip.phi) - given) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
-    for column, (k, (side, joint, sign)) in enumerate(own):
-        kind = names[k][1]
+    for column, (kind, _, (side, joint, sign)) in enumerate(own):
         of_leg = joint.startswith(("hip", "knee", "ankle"))  # which needs its own foot, trunk and arms nothing
         use = motion.determined & (known[:, SIDES.index(side)] if of_leg else True)
         # The sign of an angle turns its moment, not the power, the product of moment and rate.
@@ -235,18 +235,23 @@ def load_curves(
 
 
 def _moments_and_powers(
-    body: Body, motion: Motion, ground: Mapping[str, Wrench]
-) -> tuple[list[tuple[str, str]], Array, Array]:
-    """Return joint, kind ("moment", "power"), rows (T, m, 10N) and given (T, m): value = rows phi - given."""
-    regressor, given = torque_regressor_of_links(body, motion), ground_torques(body, motion, ground)
-    rates, groups = motion.v[:, body.n_root :], [list(chain) for chain in chains(body)]
-    # Power = sum over the joint's axes of v_j tau_j = (v'Y) phi - v'c.
-    rows = [np.einsum("tj,tjp->tp", rates[:, axes], regressor[:, axes]) for axes in groups]
-    work = [np.sum(rates[:, axes] * given[:, axes], axis=1) for axes in groups]
-    names = [(joint.name, "moment") for joint in body.joints]
-    names += [(body.joints[axes[-1]].name.rpartition("_")[0], "power") for axes in groups]
-    stacked = np.concatenate([regressor, np.stack(rows, axis=1)], axis=1)
-    return names, stacked, np.concatenate([given, np.stack(work, axis=1)], axis=1)
+    body: Body, motion: Motion, ground: Mapping[str, Wrench], wanted: Sequence[tuple[str, list[int]]]
+) -> tuple[Array, Array]:
+    """Return rows (T, m, 10L) and given (T, m) of the ``wanted`` "moment" about one axis, or "power" over the axes of a
+    joint: value = rows phi - given.
+    """
+    joints = sorted({axis for _, axes in wanted for axis in axes})
+    regressor, given = torque_regressor_of_links(body, motion, joints), ground_torques(body, motion, ground)[:, joints]
+    rows, known = np.empty((len(given), len(wanted), regressor.shape[2])), np.empty((len(given), len(wanted)))
+    for column, (kind, axes) in enumerate(wanted):
+        at = [joints.index(axis) for axis in axes]
+        if kind == "moment":
+            rows[:, column], known[:, column] = regressor[:, at[0]], given[:, at[0]]
+        else:  # sum over the joint's axes of v_j tau_j = (v'Y) phi - v'c
+            rates = motion.v[:, [body.n_root + axis for axis in axes]]
+            rows[:, column] = np.einsum("tj,tjp->tp", rates, regressor[:, at])
+            known[:, column] = np.sum(rates * given[:, at], axis=1)
+    return rows, known
 
 
 _PRESSES = 0.05

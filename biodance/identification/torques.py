@@ -17,7 +17,7 @@ C g / s and the moment by Y C g / s. Squared and summed over quantities that do 
 the moment. After ATLAS and CMS, Procedure for the LHC Higgs boson search combination, ATL-PHYS-PUB-2011-11 (2011).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,13 +100,15 @@ def torque_regressor(body: Body, motion: Motion) -> Array:
     return np.asarray(Y if body.sharing is None else Y @ body.sharing)
 
 
-def torque_regressor_of_links(body: Body, motion: Motion) -> Array:
+def torque_regressor_of_links(body: Body, motion: Motion, joints: Sequence[int] | None = None) -> Array:
     """Return Y (T, n, 10L): the same for the parameters of the links (`Body.links`), of which a segment has several
-    where it has parts.
+    where it has parts; about the axes of some ``joints`` (n,), by default all.
     """
     W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    some = list(range(len(body.joints)) if joints is None else joints)
+    axis, arm = (part[:, some] for part in _axes(body, motion))
     # Links that do not hang on the joint have no part in its torque.
-    return np.asarray(_about_axes(_axes(body, motion), W) * np.repeat(below(body), 10, axis=1))
+    return np.asarray(_about_axes((axis, arm), W) * np.repeat(below(body)[some], 10, axis=1))
 
 
 def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:
