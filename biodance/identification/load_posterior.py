@@ -95,18 +95,25 @@ class LoadView:
 
     def log_ratio(self, masses: Array) -> Array:
         """Return the log likelihood ratio (n,) of loads of ``masses`` (n,) kg against none."""
-        return _log_ratio(masses[:, None], self.shown, self.squares, self.surprise, self.unit, self.strength)
+        # Of each direction (k, 1) for every mass: Woodbury for the quadratic form of N(y; m b, 1 + m² D D').
+        surprise, unit, wide = self.surprise[:, None], self.unit[:, None], self._wide(masses)
+        spread = ((masses * (surprise - masses * unit)) ** 2 / wide).sum(axis=0) - np.log(wide.prod(axis=0))
+        return np.asarray(masses * self.shown - 0.5 * masses**2 * self.squares + 0.5 * spread)
 
     def log_place_information(self, masses: Array) -> Array:
         """Return half the logarithm (n,) of how much better the place of loads of ``masses`` (n,) kg is known after
         the data: what the evidence of each mass pays for places that the data exclude.
         """
-        return np.asarray(0.5 * np.log(1 + masses[:, None] ** 2 * self.strength).sum(axis=1))
+        return np.asarray(0.5 * np.log(self._wide(masses).prod(axis=0)))
 
     def at_the_mean(self, masses: Array) -> tuple[Array, Array]:
         """Return sum u² / (1 + m² D'D) and sum log(1 + m² D'D) (n,) for ``masses`` (n,) kg, see `log_ratio_if`."""
-        wide = 1 + masses[:, None] ** 2 * self.strength
-        return (self.unit**2 / wide).sum(axis=1), np.log(wide).sum(axis=1)
+        wide = self._wide(masses)
+        return (self.unit[:, None] ** 2 / wide).sum(axis=0), np.log(wide.prod(axis=0))
+
+    def _wide(self, masses: Array) -> Array:
+        """Return (k, n) the eigenvalues of 1 + m² D D' other than 1; their product is its determinant."""
+        return np.asarray(1 + np.multiply.outer(self.strength, masses**2))
 
     def place(self, weight: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation (3,) m of the load's CoM in the segment's frame, over masses of
@@ -130,14 +137,6 @@ def log_ratio_if(true: float, masses: Array, squares: Array, own: Array, wide: A
     # y = true b: m b'y - m² b'b / 2 = (true m - m² / 2) b'b.
     shown = np.multiply.outer(squares, true * masses - 0.5 * masses**2)
     return np.asarray(shown + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide))
-
-
-def _log_ratio(m: Array, shown: float, squares: float, surprise: Array, unit: Array, strength: Array) -> Array:
-    """Return log N(y; m b, 1 + m² D D') - log N(y; 0, 1) for masses ``m`` (n, 1)."""
-    wide = 1 + m**2 * strength
-    # Woodbury for the quadratic form, determinant lemma for log|1 + m² D D'| = sum log(1 + m² w).
-    spread = (m * (surprise - m * unit)) ** 2 / wide - np.log(wide)
-    return np.asarray(m[:, 0] * shown - 0.5 * m[:, 0] ** 2 * squares + 0.5 * spread.sum(axis=1))
 
 
 def log_mass_prior(masses: Array) -> Array:

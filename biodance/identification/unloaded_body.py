@@ -8,7 +8,6 @@ from scipy.linalg import solve_triangular
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
 from biodance.identification.placement import ODDS, matter_follows_joint, with_matter_placed, with_sides
-from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 from biodance.uncertainty.caution import in_other_frames
 
@@ -117,11 +116,11 @@ def whiten_innovation(data: Information, before: Sip) -> tuple[Array, Array, flo
     """Return the rows of the data (r, p) and the innovation relative to ``before`` (r,), both whitened by noise and by
     the uncertainty of ``before``, and the log evidence of the data without a load.
 
-    With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
+    With R phi = y + noise and phi ~ N(before, P): y - R before has the covariance 1 + R P R'.
     """
-    A = data.triangle @ prior_factor(before)
-    # Innovation y - R phi0 has the covariance 1 + R P R' = 1 + A A' = L L'.
-    L = np.linalg.cholesky(np.eye(len(A)) + A @ A.T)
+    # Innovation y - R phi0 has the covariance 1 + R P R' = L L'.
+    spread = data.triangle @ before.covariance @ data.triangle.T
+    L = np.linalg.cholesky(np.eye(len(spread)) + spread)
     both = np.column_stack([data.triangle, data.target - data.triangle @ before.phi])
     white = solve_triangular(L, both, lower=True)
     # - log|L L'| / 2 - |L^-1 innovation|² / 2.
