@@ -99,7 +99,8 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
     limits, corrected = _possible(body, limit_body(body, person), plan, person)
     notes += corrected
     plan = replace(plan, blocks=kept, alone=person.alone, holds=person.holds, careful=person != HEALTHY)
-    plan = replace(plan, care=(*plan.care, *person.care), rest=min(plan.rest, person.rest))
+    cards = math.inf if person == HEALTHY else plan.cards
+    plan = replace(plan, care=(*plan.care, *person.care), rest=min(plan.rest, person.rest), cards=cards)
     if plan.seated and person.seat_height:
         least = seat(body).seat - SEAT_TO_HIP
         if person.seat_height < least:
