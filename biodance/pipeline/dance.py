@@ -26,6 +26,7 @@ from biodance.dance.problem.feet import AROUND, room_on_plates
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
+from biodance.dance.problem.stance import SEAT_TO_HIP
 from biodance.dance.robot import design_robot, robot_plan
 from biodance.dance.search.postures import counterpart
 from biodance.dance.search.word_course import NoNextPosture, freer_dance
@@ -244,10 +245,11 @@ def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_numb
     """Return how much force plate a dance needs, and for which it was made, in the language of ``say``."""
     wide, ahead = (number(one, 2) for one in room_on_plates(dance.stances))
     room = {"wide": wide, "ahead": ahead, "around": number(100 * AROUND, 1)}
-    if any(stance.seat for stance in dance.stances):
+    if high := max(stance.seat for stance in dance.stances):
         said = say(
-            "The stool's legs need %(wide)s m of force plate from side to side and %(ahead)s m ahead; mark their "
-            "outlines.",
+            "The seat is %(high)s m high, so that the feet hang. The stool's legs need %(wide)s m of force plate from "
+            "side to side and %(ahead)s m ahead; mark their outlines.",
+            high=number(high - SEAT_TO_HIP, 2),
             **room,
         )
     elif any(np.isfinite(stance.hands).any() for stance in dance.stances):

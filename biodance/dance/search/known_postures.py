@@ -78,9 +78,9 @@ _HOLDING = Word(
 """What an arm does that holds a frame: from these angles it is bent to its grip (`posed`)."""
 
 _HANGING = Word(
-    "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(30.0)), ("elbow_flexion", 0.2)), "hang", rest=True
+    "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(12.0)), ("elbow_flexion", 0.2)), "hang", rest=True
 )
-"""What an arm does that is asked for nothing: beside the body, and as far from it as clothes need."""
+"""What an arm does that is asked for nothing: beside the body, as far from it as a hip is wide."""
 
 _FREE_ARM = "{} arms as in the picture"
 IN_PART = "as far as you may"
