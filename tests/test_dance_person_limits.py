@@ -277,6 +277,20 @@ def test_words_beyond_a_lift_are_left_out_or_say_that_they_are_cut_short(tmp_pat
     assert said.startswith("Left out for the left arm: the left arm up (a V)")
 
 
+@pytest.mark.parametrize(("most", "asked"), [(None, False), (5, False), (10, False), (20, True)])
+def test_whoever_cannot_turn_is_not_asked_to_twist_as_far_as_may_be(
+    tmp_path: Path, most: int | None, asked: bool
+) -> None:
+    text = 'cannot = ["turn"]' if most is None else f"[at_most_deg]\ntrunk_turn = {most}\n"
+    plan = replace(read_plan("patient"), blocks=(("parallel", 1),))
+    body, plan, _ = fit_to_person(BODY, plan, written(tmp_path, text))
+    (stance,) = support_sequence(body, plan)
+    trunk = words_for(body, plan, stance, read_vocabulary(), np.random.default_rng(0))["trunk"]
+    assert any(word.key.startswith("turn") for word in trunk) == asked
+    said = words_left_out(body, plan, (stance,), read_vocabulary())
+    assert any("twist to the left" in one and "trunk rotation" in one for one in said) != asked
+
+
 def lifts(dance: Dance) -> float:
     """Return the greatest angle, degrees, of the left upper arm from the trunk's down axis over a whole dance."""
     pose = poses(dance.body, dance.motion(100.0).q)
