@@ -39,6 +39,7 @@ ONE_ALGORITHM = {
     "motion/newton.py": "a person as one mass: at rest on the plates, and moving",
     "pipeline/accepted.py": "copies of a session without faults, and what each of them gains",
     "pipeline/attention.py": "what a person must see first: headline, rows, order",
+    "dance/playback.py": "a dance played in MuJoCo: torques of the plan, the body that is driven, what became of it",
     "pipeline/dance.py": "a dance from a person to its file's numbers, and what came of it",
     "pipeline/export.py": "a session, a trial or a body in the formats of others",
     "pipeline/front_dance.py": "what is conducted before a visit: dances, simulated laboratories",

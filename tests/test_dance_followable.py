@@ -19,11 +19,13 @@ from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
+from biodance.dance.problem.stance import holding, seat, stance
 from biodance.dance.search.course import Checkpoint, DesignContext
 from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
 from biodance.dance.search.word_course import NoNextPosture, WordSearch
 from biodance.dance.verify import Margin, broken, verify
 from biodance.motion.kinematics import poses
+from biodance.pipeline.still import props
 from biodance.report.dance import mannequin_svg
 
 PLAN = Plan("x", "", (("parallel", 5),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.3, gentle=True)
@@ -221,6 +223,22 @@ def test_only_the_papers_dance_is_free() -> None:
     assert most.pop("full") == np.inf
     assert max(most.values()) <= 4
     assert all(read_plan(name).whom for name in most)
+
+
+@pytest.mark.parametrize(("where", "lines"), [("stool", 1), ("frame", 2), ("free", 0)])
+def test_a_picture_shows_the_stool_and_the_grips_that_are_held(where: str, lines: int) -> None:
+    free = stance(BODY, "parallel")
+    feet = {"stool": seat(BODY, height=0.55), "frame": holding(free, BODY, ("right", "left")), "free": free}[where]
+    views = [props(feet, eye) for eye in ((1.0, 0.0), (0.0, -1.0))]
+    assert [len(one) for one in views] == [lines, lines]
+    if where == "stool":
+        np.testing.assert_allclose(views[0][0], [[-0.2, 0], [-0.2, 0.55], [0.2, 0.55], [0.2, 0]], atol=1e-9)
+        np.testing.assert_allclose(np.ptp(views[1][0], axis=0), [0.4, 0.55])
+    if where == "frame":
+        assert views[0][0][0, 0] == pytest.approx(-views[0][1][0, 0]), "a grip on either side"
+        assert all(line[1, 1] == pytest.approx(0.53 * 1.75, abs=0.02) for view in views for line in view)
+    drawn = mannequin_svg(BODY, small_dance().motion(1.0).q[-1], "posture", stance=feet)
+    assert drawn.count("<polyline") == 2 * lines
 
 
 def test_a_picture_has_both_views_and_a_title() -> None:

@@ -9,11 +9,11 @@ from small_dances import small_dance
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.dance.playback import Playback, Rehearsal, floor_model, play
+from biodance.dance.playback import Playback, Rehearsal, borne_by_feet, floor_model, play
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.records import Motion, Subject
+from biodance.records import Array, Motion, Subject, Wrench
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra peers)")
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
@@ -55,6 +55,39 @@ def test_a_balanced_motion_stays_up_and_near_its_plan(degrees: dict[str, float])
     assert np.degrees(found.tilt_error.max()) < 1.0
     assert np.nanmax(found.zmp_error) < 0.01
     np.testing.assert_allclose(found.wrench.force[-1], [0, 0, 65 * 9.80665], atol=2.0)
+
+
+_FOOT = np.array([[-0.07, -0.05, 0.0], [-0.07, 0.05, 0.0], [0.2, 0.05, 0.0], [0.2, -0.05, 0.0]])
+_STEP = np.array([[0.2, -0.11, 0.0], [0.0, 0.11, 0.0]])
+"""Where the right foot, one in front, and the left one stand, m."""
+
+
+def feet_of(point: Array, down: tuple[bool, bool] = (True, True)) -> tuple[list[Wrench], Wrench]:
+    """Return what the feet bear of a push of 1000 N up and 40 N ahead, with a twist, at ``point`` m on the floor."""
+    force, twist = np.array([40.0, -20.0, 1000.0]), np.array([0.0, 0.0, 5.0])
+    total = Wrench(np.zeros(1), np.concatenate([force, np.cross(point, force) + twist])[None])
+    return borne_by_feet(total, [(_FOOT + place)[None] for place in _STEP], np.array([down])), total
+
+
+@pytest.mark.parametrize("point", [(0.14, -0.08), (0.16, 0.05), (0.05, 0.11), (0.39, -0.15), (-0.06, 0.15)])
+def test_no_foot_presses_outside_its_own_sole_though_the_point_lies_beside_the_line_between_them(
+    point: tuple[float, float],
+) -> None:
+    parts, total = feet_of(np.array([*point, 0.0]))
+    np.testing.assert_allclose(sum(part.value for part in parts), total.value, atol=1e-9)
+    for part, place in zip(parts, _STEP, strict=True):
+        if part.force[0, 2] > 1.0:
+            low, high = (_FOOT + place)[[0, 2], :2]
+            assert np.all(part.cop()[0, :2] >= low - 0.001), point
+            assert np.all(part.cop()[0, :2] <= high + 0.001), point
+
+
+def test_a_foot_alone_bears_all_and_forces_add_up_outside_the_soles() -> None:
+    (right, left), total = feet_of(np.array([0.05, 0.10, 0.0]), down=(False, True))
+    np.testing.assert_allclose(left.value, total.value, atol=1e-9)
+    assert np.abs(right.value).max() < 1e-9
+    parts, total = feet_of(np.array([0.1, -0.4, 0.0]))
+    np.testing.assert_allclose(sum(part.value for part in parts), total.value, atol=1e-9)
 
 
 def test_lifting_a_foot_without_shifting_the_weight_falls() -> None:

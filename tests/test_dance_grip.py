@@ -99,6 +99,9 @@ def test_a_persons_file_puts_the_hand_on_the_frame_in_every_stance(tmp_path: Pat
     feet = support_sequence(body, plan)
     assert all(np.isfinite(one.hands[0]).all() and np.isnan(one.hands[1]).all() for one in feet)
     assert not any(np.isfinite(one.hands).any() for one in support_sequence(body, replace(plan, holds=())))
+    _, seated, notes = fit_to_person(BODY, read_plan("chair"), read_person(path))
+    assert seated.holds == ()
+    assert any("On the stool no hand holds a frame" in note for note in notes)
     path.write_text('hold_frame = ["both"]\n')
     with pytest.raises(BiodanceError, match="'both' is not a hand"):
         read_person(path)

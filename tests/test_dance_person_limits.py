@@ -12,7 +12,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import ArmLift, FootLoad
-from biodance.dance.problem.feet import support_sequence
+from biodance.dance.problem.feet import support_sequence, within_cards
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import seat
@@ -21,8 +21,8 @@ from biodance.dance.search.known_postures import read_vocabulary, words_for, wor
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names
 from biodance.motion.kinematics import poses
-from biodance.pipeline.dance import dancer
-from biodance.records import Subject
+from biodance.pipeline.dance import dancer, make_dance
+from biodance.records import SIDES, Subject
 
 LIFT, LOAD = ArmLift(70.0, 60.0, 100.0, 100.0, 90.0), FootLoad(0.55, 0.7)
 each = pytest.mark.parametrize("limit", [LIFT, LOAD], ids=lambda limit: limit.name)
@@ -218,6 +218,43 @@ def test_a_seat_on_which_the_feet_would_not_hang_is_raised(tmp_path: Path) -> No
         assert any("The seat must be" in note for note in notes) == raised
 
 
+@pytest.mark.parametrize(
+    ("text", "protocol", "widened"),
+    [
+        ("[range_deg]\nleft_shoulder_flexion = [20, 70]\n", "patient", True),  # the arm must hang
+        ("[at_most_deg]\nhip_bend = 60\n", "chair", True),  # nobody sits with less
+        ("seat_height_m = 0.35\n", "chair", True),
+        ("seat_height_m = 0.35\n", "patient", False),  # there is no seat
+        ("seat_height_m = 0.9\n", "chair", False),
+        ('cannot = ["turn", "stand on left leg"]\n', "patient", False),  # a few degrees, as joints are read
+        (None, "patient", False),
+    ],
+)
+def test_a_limit_that_is_not_kept_needs_somebody_and_what_is_left_out_nobody(
+    text: str | None, protocol: str, widened: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise BiodanceError("not designed here")
+
+    monkeypatch.setattr("biodance.pipeline.dance.design", none)
+    subject, plan = Subject(65.0, 1.75, "F", 33.0), read_plan(protocol)
+    person = read_person(folder("protocols") / "limits" / "stroke.toml") if text is None else written(tmp_path, text)
+    made = make_dance(dancer(subject, plan), plan, person, subject=subject)
+    assert made.widened == widened
+    assert not made.settled, "there is no dance"
+
+
+@pytest.mark.parametrize("alone", [SIDES, ("right",), ("left",), ()])
+def test_a_person_with_limits_gets_twelve_cards_of_easy_and_everybody_else_all(alone: tuple[str, ...]) -> None:
+    person = PersonLimits(stand_alone_on=alone, max_speed=2.0)
+    body, plan, _ = fit_to_person(BODY, read_plan("easy"), person)
+    cards = support_sequence(body, within_cards(body, plan))
+    assert len(cards) == 12
+    assert {one.name for one in cards} == {one.name for one in support_sequence(body, plan)}
+    usual = fit_to_person(BODY, read_plan("easy"), HEALTHY)[1]
+    assert within_cards(BODY, usual).blocks == read_plan("easy").blocks
+
+
 def test_a_leg_that_bears_less_than_half_asks_for_the_chair(tmp_path: Path) -> None:
     person = written(tmp_path, "[weight_bearing]\nleft = 0.3\n")
     with pytest.raises(BiodanceError, match="Use --protocol chair"):
@@ -238,6 +275,20 @@ def test_words_beyond_a_lift_are_left_out_or_say_that_they_are_cut_short(tmp_pat
     body, plan, _ = fit_to_person(BODY, plan, written(tmp_path, "[at_most_deg]\nleft_arm_lift = 66\n"))
     (said,) = words_left_out(body, plan, (stance,), read_vocabulary())
     assert said.startswith("Left out for the left arm: the left arm up (a V)")
+
+
+@pytest.mark.parametrize(("most", "asked"), [(None, False), (5, False), (10, False), (20, True)])
+def test_whoever_cannot_turn_is_not_asked_to_twist_as_far_as_may_be(
+    tmp_path: Path, most: int | None, asked: bool
+) -> None:
+    text = 'cannot = ["turn"]' if most is None else f"[at_most_deg]\ntrunk_turn = {most}\n"
+    plan = replace(read_plan("patient"), blocks=(("parallel", 1),))
+    body, plan, _ = fit_to_person(BODY, plan, written(tmp_path, text))
+    (stance,) = support_sequence(body, plan)
+    trunk = words_for(body, plan, stance, read_vocabulary(), np.random.default_rng(0))["trunk"]
+    assert any(word.key.startswith("turn") for word in trunk) == asked
+    said = words_left_out(body, plan, (stance,), read_vocabulary())
+    assert any("twist to the left" in one and "trunk rotation" in one for one in said) != asked
 
 
 def lifts(dance: Dance) -> float:

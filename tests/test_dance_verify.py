@@ -182,6 +182,16 @@ def test_the_dance_on_disk_knows_that_it_is_not_safe(result: DanceResult, tmp_pa
     assert Dance.load(tmp_path / "dance.npz").unsafe == (SHORT,)
 
 
+def test_somebody_must_act_where_it_is_not_safe_or_a_limit_was_widened_and_not_for_what_is_left_out(
+    result: DanceResult,
+) -> None:
+    assert not result.settled
+    safe = replace(result, margins=(), notes=("Left out: lean to the left.",))
+    assert safe.settled
+    assert not replace(safe, widened=True).settled
+    assert not replace(safe, dance=None).settled
+
+
 def test_nothing_that_leads_is_written_of_it(result: DanceResult, tmp_path: Path) -> None:
     with without_pictures():
         found = write_dance(result, tmp_path)

@@ -358,7 +358,7 @@ def test_the_page_rests_shows_first_and_speaks_only_when_asked_by_a_voice_of_thi
     assert browser.run("wait") == pytest.approx(slow + 0.05, abs=1e-6)
     browser.run(f"wait = 0; second = {cue['move_s']} - 0.05" + frame)
     assert not browser.run("playing")
-    assert browser.run("[by('now').textContent, pausing]") == ["Rest. Let the arms down", "rest"]
+    assert browser.run("[by('now').textContent, pausing]") == ["Rest. Let free arms down", "rest"]
     browser.run("run(true)")
     assert browser.run("[pausing, wait]") == ["back", 5]
     browser.run(frame)

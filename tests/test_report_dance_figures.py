@@ -1,15 +1,29 @@
 """Figures of a dance: bones join where joints are, every posture is drawn, outlines close."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
+import pytest
+from small_dances import small_dance
 
 from biodance.body.human.human import human
 from biodance.dance.expectation import Expectation
+from biodance.dance.playback import Playback, Rehearsal
+from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.stance import stance
 from biodance.dance.verify import ZmpPath
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines
-from biodance.records import Subject
-from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
+from biodance.records import Array, Subject
+from biodance.report.figures.dance import (
+    criterion_figure,
+    expectation_figure,
+    postures_figure,
+    write_film,
+    zmp_figure,
+)
 
 BODY = human(Subject(65.0, 1.75, "F"))
 
@@ -63,3 +77,23 @@ def test_expected_accuracy_starts_at_the_table_and_pairs_share_a_line() -> None:
     for axes in drawn.axes:
         assert len(axes.lines) == 7
         assert all(line.get_ydata()[0] == 100.0 and line.get_ydata()[-1] == 50.0 for line in axes.lines)
+
+
+def test_an_arm_held_far_to_the_side_stays_in_the_picture_of_the_film(tmp_path: Path) -> None:
+    image_of = pytest.importorskip("PIL.Image")
+    dance = small_dance()
+    far = dance.postures.copy()
+    far[:, ROOT + dance.body.joint_index("left_shoulder_adduction")] = np.radians(-90.0)
+    far[:, ROOT + dance.body.joint_index("left_elbow_flexion")] = 0.0
+    dance = replace(dance, postures=far, via=np.tile(far[0], (1, 2, 1)))
+    motion = dance.motion(100.0)
+    wrench, none = predict_wrench(dance.body, motion), np.zeros(motion.time.size)
+    angles: Array = np.zeros((motion.time.size, len(dance.body.joints)))
+    as_planned = Playback(motion.time, angles, none, none, wrench, wrench, np.nan, motion.q, {})
+    write_film(Rehearsal(dance, as_planned, none), tmp_path / "film.gif")
+    with image_of.open(tmp_path / "film.gif") as film:
+        picture = np.asarray(film.convert("L"))
+    for left in range(0, 4 * 290, 290):
+        drawn = np.flatnonzero((picture[60:440, left : left + 290] < 240).any(axis=0))
+        assert drawn.min() >= 5, "px that are left beside the person"
+        assert drawn.max() <= 284

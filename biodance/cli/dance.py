@@ -86,8 +86,9 @@ def dance_command(
 
     Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html
     (printable cards), margins.md, figures and results.json. Ctrl-C keeps finished parts; the same command resumes from
-    there. If no dance satisfies all limits, the violated limit is reported (exit code 1). What leads a person (cards,
-    cues, dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given.
+    there. If no dance satisfies all limits, the violated limit is reported. What leads a person (cards, cues,
+    dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given. The exit code is 1
+    where somebody must act: there is no dance, it is NOT SAFE, or a limit of the person's file had to be widened.
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.lab.session.results_folder import whole_folder
@@ -122,7 +123,7 @@ def dance_command(
         )
     if not result.feasible:
         shared.say(f"There is no such dance. {result.reason}")
-    return shared.DONE if result.feasible and result.complete else shared.NEEDS_A_PERSON
+    return shared.DONE if result.settled else shared.NEEDS_A_PERSON
 
 
 @shared.app.command(name="limits")

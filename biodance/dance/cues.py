@@ -31,7 +31,7 @@ PLANTED = ("knee_flexion",)
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
 """Beginnings of the names of the joints of the right and of the left arm."""
 _LIFTED = ("shoulder_flexion", "shoulder_adduction")  # Movements whose right angle is shoulder height
-REST = "Then rest: let the arms down. Take up this posture again when you are ready."
+REST = "Then rest: let free arms down. Take up this posture again when you are ready."
 """What is called where the person rests (`rests`)."""
 _PLURAL = {"foot": "feet"}
 MIRROR_CALL = ("mirror: the same with right and left exchanged",)

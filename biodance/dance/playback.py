@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from biodance.body.body import Body
 from biodance.body.export import mjcf
@@ -15,10 +16,10 @@ from biodance.dance.limits.floor import LowParts
 from biodance.dance.problem.splines import phase_at
 from biodance.dance.problem.stance import support_depth
 from biodance.errors import BiodanceError, MissingLibrary
-from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
+from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Motion, Wrench
-from biodance.spatial import quaternion_matrix, wrench_of_force
+from biodance.spatial import quaternion_matrix, wrench_about_origin, wrench_about_point, wrench_of_force
 
 _STEP = 0.00025
 """s, of the simulation: at 1 and 0.5 ms stiff legs ring on the floor and topple postures that stand at 0.25 ms."""
@@ -37,6 +38,8 @@ leg until he falls; 4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the p
 """
 RADIUS = 0.004
 """m, of the contact points under the soles."""
+_EQUAL = 0.03
+"""Weight of equal forces at the corners of the soles, against the zero-moment point in dm."""
 TOUCHING = 0.01
 """m over the floor up to which a planned sole counts as planted for the planned torques."""
 
@@ -104,13 +107,39 @@ def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np
     """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet (right, left) that are
     ``down`` (T, 2); without it, those whose soles are near the floor.
     """
-    pose = poses(body, motion.q)
-    soles = [pose.rotation[:, f.segment] @ f.outline.mean(axis=0) + pose.position[:, f.segment] for f in _both(body)]
+    pose, feet = poses(body, motion.q), _both(body)
+    soles = [pose.points([foot.segment] * len(foot.outline), foot.outline) for foot in feet]
     if down is None:
-        down = np.stack([sole[:, 2] < TOUCHING for sole in soles], axis=1)
-    parts = distribute(wrench, soles[0], soles[1], down)
-    names = [body.segments[f.segment] for f in _both(body)]
+        down = np.stack([sole[:, :, 2].mean(axis=1) < TOUCHING for sole in soles], axis=1)
+    parts = borne_by_feet(wrench, soles, down)
+    names = [body.segments[foot.segment] for foot in feet]
     return joint_torques(body, motion, dict(zip(names, parts, strict=True))).torque
+
+
+def borne_by_feet(total: Wrench, soles: list[Array], down: NDArray[np.bool_]) -> list[Wrench]:
+    """Return the wrench of each foot, their sum ``total``: pressing forces at the corners of the ``soles`` (T, K, 3)
+    that are ``down``, as equal as the zero-moment point allows, so that no foot is asked for pressure outside its own
+    sole (as the rule of `motion.dynamics.distribute` may); the horizontal force and the twist go with them.
+    """
+    point = np.nan_to_num(total.cop())  # no load: about the origin
+    corners, foot = np.concatenate(soles, axis=1), np.repeat([0, 1], [sole.shape[1] for sole in soles])
+    bears = np.where(down.any(axis=1, keepdims=True), down, True)[:, foot]  # no foot planned down: both
+    shares = np.zeros(bears.shape)
+    for t, here in enumerate(bears):
+        # least squares: the shares add up to 1, their middle is the zero-moment point (in dm), and each is near 0
+        away = 10.0 * (corners[t, here, :2] - point[t, :2]).T
+        rows = np.vstack([np.ones(here.sum()), away, _EQUAL * np.eye(here.sum())])
+        shares[t, here] = nnls(rows, np.eye(len(rows))[0])[0]
+    shares /= shares.sum(axis=1, keepdims=True)
+    middle = np.einsum("tk,tki->ti", shares, corners)
+    whole, out = wrench_about_point(total.value, point), list[Wrench]()
+    for side in (0, 1):
+        share = shares[:, foot == side]
+        own = share.sum(axis=1, keepdims=True)
+        place = np.einsum("tk,tki->ti", share, soles[side]) / np.where(own > 0, own, 1.0)
+        # what the soles cannot bear (a point outside of them) moves both places alike: forces and moments add up
+        out.append(Wrench(total.time, own * wrench_about_origin(whole, place + point - middle)))
+    return out
 
 
 def _both(body: Body) -> tuple[Any, Any]:

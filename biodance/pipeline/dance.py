@@ -23,9 +23,10 @@ from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import ForImprecise, Limit, family
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.feet import AROUND, room_on_plates
-from biodance.dance.problem.person import PersonLimits, fit_to_person
+from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
+from biodance.dance.problem.stance import SEAT_TO_HIP
 from biodance.dance.robot import design_robot, robot_plan
 from biodance.dance.search.postures import counterpart
 from biodance.dance.search.word_course import NoNextPosture, freer_dance
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 _AS_MUCH = 1.1
 """Times as much left of the table's standard deviation of a counterpart's mass: less is no effect of an emphasis."""
+_BEYOND = np.radians(3.1)  # rad that joints go beyond a limit in a person's file of which nobody need decide
 _FAR, _NEW = 3.0, 0.9
 """Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
 what is not learned.
@@ -76,6 +78,8 @@ class DanceResult:
     freely : Expectation or None
         What would be known after as many of the same postures chosen freely (`freer_dance`): the price of a dance that
         can be followed; None where nothing limits the choice.
+    widened : bool
+        Whether a limit of the person's own is not kept, as nobody can do without what it forbids (``notes``).
 
     Examples
     --------
@@ -95,6 +99,7 @@ class DanceResult:
     seconds: float
     reason_of_person: str = ""
     freely: Expectation | None = None
+    widened: bool = False
 
     def __repr__(self) -> str:
         return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
@@ -180,14 +185,11 @@ class DanceResult:
         return (*self.notes, *(self.dance.notes if self.dance else ()))
 
     @property
-    def complete(self) -> bool:
-        """True where nothing of the protocol was left out, and imprecise people are safe."""
-        counted = self.dance.counted.sum() if self.dance else 0
-        return (
-            not self.notes
-            and not broken(self.margins)
-            and (np.isfinite(self.plan.budget) or counted == self.plan.count)
-        )
+    def settled(self) -> bool:
+        """True where nobody has to decide anything: there is a dance, imprecise people are safe in it, and no limit of
+        the person's own was widened.
+        """
+        return self.feasible and not self.widened and not broken(self.margins)
 
 
 def before_cues(result: DanceResult, say: Say = in_english, number: Number = as_number) -> tuple[str, ...]:
@@ -243,10 +245,11 @@ def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_numb
     """Return how much force plate a dance needs, and for which it was made, in the language of ``say``."""
     wide, ahead = (number(one, 2) for one in room_on_plates(dance.stances))
     room = {"wide": wide, "ahead": ahead, "around": number(100 * AROUND, 1)}
-    if any(stance.seat for stance in dance.stances):
+    if high := max(stance.seat for stance in dance.stances):
         said = say(
-            "The stool's legs need %(wide)s m of force plate from side to side and %(ahead)s m ahead; mark their "
-            "outlines.",
+            "The seat is %(high)s m high, so that the feet hang. The stool's legs need %(wide)s m of force plate from "
+            "side to side and %(ahead)s m ahead; mark their outlines.",
+            high=number(high - SEAT_TO_HIP, 2),
             **room,
         )
     elif any(np.isfinite(stance.hands).any() for stance in dance.stances):
@@ -359,6 +362,9 @@ def make_dance(
     started, robot = time.perf_counter(), subject is None
     plan = robot_plan(body, plan) if robot else plan
     own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
+    asked = limit_body(body, person)
+    beyond = max(np.max(asked.lower - own.limits.lower), np.max(own.limits.upper - asked.upper))
+    widened = bool(beyond > _BEYOND or 0 < person.seat_height < plan.seat_height)
     if robot:
         coarse = pairs_of(body).unchecked
         boxes = f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}."
@@ -386,7 +392,8 @@ def make_dance(
     if reason:
         dance = counted = expected = freely = None
     spent = time.perf_counter() - started
-    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
+    known = counted, expected, reason, notes, spent, person.reason, freely
+    return DanceResult(own, plan, dance, margins, *known, widened)
 
 
 def _freer_expectation(dance: Dance, plan: Plan) -> Expectation | None:

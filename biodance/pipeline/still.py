@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.solids import box_solid, shape_parts
+from biodance.dance.problem.stance import SEAT_TO_HIP, Stance
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.load_words import size_and_segments
 from biodance.library import locate, read_toml
@@ -79,6 +80,19 @@ def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[st
         points = _solid_points(box.tobytes()) @ pose.rotation[0, segment].T + pose.position[0, segment]
         flat = points @ seen.T
         out.append((body.segments[segment], flat[ConvexHull(flat).vertices], float((points @ toward).mean())))
+    return out
+
+
+def props(stance: Stance | None, eye: tuple[float, float]) -> list[Array]:
+    """Return what ``eye`` sees of a stool and of the grips that are held: lines (n, 2) m, across and up."""
+    if stance is None:
+        return []
+    across, high, out = np.array([-eye[1], eye[0]]), stance.seat - SEAT_TO_HIP, []
+    if stance.seat:
+        left, right = np.sort(stance.props @ across)[[0, -1]]
+        out.append(np.array([[left, 0.0], [left, high], [right, high], [right, 0.0]]))
+    for hand in stance.hands[list(stance.holding)]:
+        out.append(np.array([[hand[:2] @ across, 0.0], [hand[:2] @ across, hand[2]]]))
     return out
 
 

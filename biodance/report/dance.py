@@ -11,7 +11,7 @@ from biodance.dance.cues import REST, cue_sheet, dance_instructions, rests
 from biodance.dance.dance import Dance
 from biodance.dance.playback import Rehearsal
 from biodance.dance.problem.feet import room_on_plates
-from biodance.dance.problem.stance import stance_words
+from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.plain_text import for_spreadsheet
@@ -24,7 +24,7 @@ from biodance.pipeline.dance import (
     preview_parameters,
     setpoints,
 )
-from biodance.pipeline.still import posture_still, silhouettes
+from biodance.pipeline.still import posture_still, props, silhouettes
 from biodance.records import Array
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
@@ -43,22 +43,28 @@ _TALL, _GAP, _LABEL = 150.0, 12.0, 70.0
 _MIDDLE = "#8d99a6"
 
 
-def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS) -> str:
-    """Return the picture of the posture ``q`` (nq,) by ``eyes``; ``title`` is read to who cannot see it."""
-    views = [(words, silhouettes(body, q, eye)) for words, eye in eyes]
+def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS, stance: Stance | None = None) -> str:
+    """Return the picture of the posture ``q`` (nq,) by ``eyes``, with stool and grips of the ``stance``; ``title`` is
+    read to who cannot see it.
+    """
+    views = [(words, silhouettes(body, q, eye), props(stance, eye)) for words, eye in eyes]
     height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
     # the first view's height fills the picture; a small robot or a child stays smaller than that
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
-    for words, parts in views:
-        across = np.concatenate([outline[:, 0] for _, outline, _ in parts])
+    for words, parts, lines in views:
+        across = np.concatenate([outline[:, 0] for outline in (*(part[1] for part in parts), *lines)])
         wide = scale * float(np.ptp(across))
         room = max(wide, _LABEL)
         start = left + (room - wide) / 2 - scale * float(across.min())
+
+        def path(points: Array, start: float = start) -> str:
+            return " ".join(f"{start + scale * u:.1f},{_TALL - scale * z:.1f}" for u, z in points)
+
+        drawn += [f'<polyline points="{path(line)}" fill="none" stroke="#46535f" stroke-width="2"/>' for line in lines]
         for name, outline, _ in sorted(parts, key=lambda one: one[2]):
-            path = " ".join(f"{start + scale * u:.1f},{_TALL - scale * z:.1f}" for u, z in outline)
             side = name.partition("_")[0]
             colour = _MIDDLE if side not in SIDE_COLOURS or side == "middle" else SIDE_COLOURS[side][0]
-            drawn.append(f'<polygon points="{path}" fill="{colour}"/>')
+            drawn.append(f'<polygon points="{path(outline)}" fill="{colour}"/>')
         drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
         left += room + _GAP
     return (
@@ -79,7 +85,7 @@ def cards_page(result: DanceResult, language: str | Path = ENGLISH) -> str:
         feet = say(stance_words(stance))
         title = f"{p + 1}. {name}, {feet}"
         views = tuple((say(view), eye) for view, eye in _VIEWS)
-        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title)), views))
+        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title)), views, stance))
         called = {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said}
         cues.append(called | {"picture": picture, "rest": say(REST) if pauses[p] else ""})
     return render(
@@ -182,10 +188,6 @@ def playback_document(found: Rehearsal, film: Path) -> Row:
     }
 
 
-DOTS = 160
-"""Dots per inch of the figures."""
-
-
 def write_dance(
     result: DanceResult, folder: Path, *, despite: bool = False, language: str | Path = ENGLISH
 ) -> dict[str, Any]:
@@ -203,7 +205,9 @@ def write_dance(
         if despite or not dance.unsafe:
             texts |= _leading(result, dance, folder, language)
         left_out = "\n\n".join(("", "# What was left out or corrected", *result.left_out)) if result.left_out else ""
-        texts["margins.md"] = _MARGINS.format(markdown_table(MARGIN_ROW, found["margins"])) + left_out
+        checked = "Checked on the finished dance, every 0.01 s, by other code than its design."
+        margins = markdown_table(MARGIN_ROW, found["margins"])
+        texts["margins.md"] = f"# What is left of every limit\n\n{checked}\n\n{margins}{left_out}"
         counted = np.flatnonzero(dance.counted).tolist()
         words = {"parallel": "feet parallel", "right_forward": "right forward", "seated": "seated"}
         names = [dance.stances[p].name for p in counted]
@@ -217,18 +221,11 @@ def write_dance(
             "expectation": expectation_figure(result.expectation),
         }
         for name, figure in drawn.items():
-            figure.savefig(folder / f"{name}.png", dpi=DOTS, metadata={"Software": None})
+            figure.savefig(folder / f"{name}.png", dpi=160, metadata={"Software": None})
         stills = [posture_still(dance.body, q, title) for q, title in zip(postures, titles, strict=True)]
         if picture := sheet_png(stills):
             (folder / "postures_3d.png").write_bytes(picture)
     return write_results(folder, found, texts)
-
-
-_MARGINS = """# What is left of every limit
-
-Checked on the finished dance, every 0.01 s, by other code than its design.
-
-{}"""
 
 
 def _leading(result: DanceResult, dance: Dance, folder: Path, language: str | Path) -> dict[str, str]:

@@ -143,6 +143,17 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     return tuple(out)
 
 
+def within_cards(body: Body, plan: Plan) -> Plan:
+    """Return the plan with at most so many postures as it has ``cards``, those in between among them: one after the
+    other of the feet with most is left out.
+    """
+    while len(support_sequence(body, plan)) > plan.cards:
+        most = max(plan.blocks, key=lambda block: block[1])
+        fewer = [(name, count - ((name, count) == most)) for name, count in plan.blocks]
+        plan = replace(plan, blocks=tuple((name, count) for name, count in fewer if count))
+    return plan
+
+
 def _double(body: Body, plan: Plan, name: str) -> Stance:
     wide, forward = feet_on_plate(body, plan)
     feet = stance(body, name, right=forward if name == "right_forward" else 0.0, share=plan.share, wide=wide)

@@ -98,8 +98,12 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
     ]
     limits, corrected = _possible(body, limit_body(body, person), plan, person)
     notes += corrected
-    plan = replace(plan, blocks=kept, alone=person.alone, holds=person.holds, careful=person != HEALTHY)
-    plan = replace(plan, care=(*plan.care, *person.care), rest=min(plan.rest, person.rest))
+    holds = () if plan.seated else person.holds
+    notes += ["On the stool no hand holds a frame: frames are for who stands."] if holds != person.holds else []
+    plan = replace(plan, blocks=kept, alone=person.alone, holds=holds, careful=person != HEALTHY)
+    cards = math.inf if person == HEALTHY else plan.cards
+    care = tuple(dict.fromkeys((*plan.care, *person.care)))  # what both say once
+    plan = replace(plan, care=care, rest=min(plan.rest, person.rest), cards=cards)
     if plan.seated and person.seat_height:
         least = seat(body).seat - SEAT_TO_HIP
         if person.seat_height < least:

@@ -17,6 +17,7 @@ plan (`person.fit_to_person`): whoever designs needs the two records only. The f
     simplicity = 1.0             the performer's term: 0 = excitation only; 1 = an instruction costs half a second
                                  (free: a simple dance is worth as much as an exciting one)
     rest_after_s = 25            of dancing after which the person rests
+    patient_cards = 12           most cards, postures in between among them, of a person with limits of their own
     budget_s = 115               of free ones: those that inform most per second are danced until the time is used up
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
@@ -119,7 +120,8 @@ class Plan:
     without effort, or all that a healthy joint allows (the paper); ``slower`` times that it takes as long as the
     protocol says, whose seconds must be legal: of robots; ``seat_height`` m of a person's own stool, 0 any; ``careful``
     of people with limits of their own: words that they can do nowhere are named; ``hanging`` arms; ``care`` sentences
-    about helpers, rests and when to stop; ``rest`` s of dancing after which the person rests.
+    about helpers, rests and when to stop; ``rest`` s of dancing after which the person rests; ``cards`` most postures,
+    those in between among them (inf: all of the blocks).
     """
 
     name: str
@@ -148,6 +150,7 @@ class Plan:
     hanging: tuple[str, ...] = ()
     care: tuple[str, ...] = ()
     rest: float = float("inf")
+    cards: float = float("inf")
     limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:
@@ -170,6 +173,7 @@ class Plan:
             ("simplicity", 0.0, 100.0, ""),
             ("instructions", 2.0, float("inf"), ""),
             ("rest", LEAST_REST * self.slower, float("inf"), "s"),
+            ("cards", 2.0, float("inf"), ""),
             ("wide", LEAST_WIDE, 1.5, "times the usual distance"),
         ):
             value = getattr(self, name)
@@ -230,6 +234,7 @@ _NUMBERS = {
     "wide": "wide",
     "other_weight": "other_weight",
     "rest_after_s": "rest",
+    "patient_cards": "cards",
 }
 """Key of the file: field of the Plan."""
 _SHORT = {"share_of_support": ("balance", "share")}  # Key of the file: limit and its number

@@ -43,7 +43,7 @@ _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
 )
 """Joints by what moves."""
 _FITS = np.radians(25.0)
-"""rad: a word that a person's range shortens by more is not asked of that person."""
+"""rad: a word is not asked of whom it would be shortened by more in a joint, or by half of its greatest angle."""
 _CUT = np.radians(10.0)  # rad by which a word may be cut short without saying so
 _STOP = np.radians(1.5)  # rad that a word keeps from a joint's stop
 
@@ -78,9 +78,9 @@ _HOLDING = Word(
 """What an arm does that holds a frame: from these angles it is bent to its grip (`posed`)."""
 
 _HANGING = Word(
-    "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(30.0)), ("elbow_flexion", 0.2)), "hang", rest=True
+    "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(12.0)), ("elbow_flexion", 0.2)), "hang", rest=True
 )
-"""What an arm does that is asked for nothing: beside the body, and as far from it as clothes need."""
+"""What an arm does that is asked for nothing: beside the body, as far from it as a hip is wide."""
 
 _FREE_ARM = "{} arms as in the picture"
 IN_PART = "as far as you may"
@@ -252,11 +252,17 @@ def _short_of(body: Body, plan: Plan, part: str, word: Word) -> str:
     """Return the joint whose range leaves too little of a word, or the limb that may not go so far, "" if none does."""
     if part == "legs" or word.rest:
         return ""
+    most = max((abs(angle) for joint, angle in word.angles if joint not in _PELVIS), default=0.0)
+
+    def too_little(left: float, angle: float) -> bool:
+        """Of what the word is about half must be left: whoever cannot turn is not asked to twist."""
+        return abs(left - angle) > (min(_FITS, most / 2) if abs(angle) == most else _FITS)
+
     for joint, angle in word.angles:
-        if abs(_near(body, part, joint, angle) - angle) > _FITS:
+        if too_little(_near(body, part, joint, angle), angle):
             return own_joint(part, joint)
     within = _within(body, plan, part, word)
-    return f"{part} as it may be lifted" if any(abs(within[j] - angle) > _FITS for j, angle in word.angles) else ""
+    return f"{part} as it may be lifted" if any(too_little(within[j], angle) for j, angle in word.angles) else ""
 
 
 def _near(body: Body, part: str, joint: str, angle: float) -> float:

@@ -20,7 +20,7 @@ from biodance.body.body import Body
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import PostureInformation, update_posterior
-from biodance.dance.problem.feet import support_sequence
+from biodance.dance.problem.feet import support_sequence, within_cards
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via
 from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
@@ -367,13 +367,14 @@ def word_course(search: WordSearch) -> Course:
     """
     body, plan, notes = search.work.chain.body, search.work.plan, list[str]()
     while True:
+        short = within_cards(body, plan)
         try:
-            course = search.course(support_sequence(body, plan))
+            course = search.course(support_sequence(body, short))
         except NoNextPosture as why:
             blocks = why.possible(plan.blocks)
             if sum(count for _, count in blocks) < LEAST:
                 raise
-            notes.append(why.note(plan.blocks))
+            notes.append(why.note(short.blocks))
             plan = replace(plan, blocks=blocks)
         else:
             notes += words_left_out(body, plan, course.stances, search.words)

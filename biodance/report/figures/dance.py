@@ -128,6 +128,7 @@ def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) 
 
 _RATE = 25.0  # Pictures per second
 _SIZE, _FLOOR = (290, 480), 450  # Of one view, px; row of the floor
+_MARGIN = 8.0  # px beside the widest posture
 _SCALE = 170.0  # px per metre of a person's height
 _TALL = 1.75  # m: bodies are drawn as large as if they were so tall
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
@@ -162,10 +163,10 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / _RATE)))
     plan = found.dance.motion(played.wrench.rate).q[rows]
     cop = played.wrench.cop()[rows]
-    # the tallest posture fits into the picture: a dance may begin bent, and end with arms overhead
-    tall = (silhouettes(body, q, _VIEWS[0][1]) for q in plan[:: max(1, len(plan) // 60)])
-    height = max(float(outline[:, 1].max()) for parts in tall for _, outline, _ in parts)
-    scale = _SCALE * _TALL / max(height, 0.2)
+    # the tallest posture fits into the picture, and the widest: arms overhead, a leg lifted to the side
+    shown = [silhouettes(body, q, eye) for q in plan[:: max(1, len(plan) // 60)] for _, eye in _VIEWS]
+    wide, tall = np.max([np.abs(outline).max(axis=0) for parts in shown for _, outline, _ in parts], axis=0)
+    scale = min(_SCALE * _TALL / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
     frames = [
         _picture(body, (("planned", planned), ("played", real)), point, float(t), scale)
         for planned, real, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)

@@ -157,7 +157,7 @@ COMPOSED = (
     *(N_("with the right foot in front, the weight on the right one"),),
     *(N_("with the right foot in front, the weight on the left one"),),
     *(N_("on the right leg alone"), N_("on the left leg alone")),
-    N_("Then rest: let the arms down. Take up this posture again when you are ready."),
+    N_("Then rest: let free arms down. Take up this posture again when you are ready."),
     *(N_("one"), N_("two"), N_("three"), N_("four"), N_("five"), N_("six"), N_("seven"), N_("eight")),
     *(N_("reserve for the balance"), N_("room under hands, knees and head"), N_("room between arms, legs and trunk")),
 )

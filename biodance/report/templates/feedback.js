@@ -210,7 +210,7 @@ function tell(now) {
   while (held_in && left_out.has(held_in)) held_in--;
   const back = say("Take up posture %(number)s again. Next:", { number: cues[held_in].number });
   const hold = last ? data.still : say("%(still)s. Next:", { still: data.still });
-  by("now").textContent = pausing === "rest" ? say("Rest. Let the arms down") : pausing === "back" ? back :
+  by("now").textContent = pausing === "rest" ? say("Rest. Let free arms down") : pausing === "back" ? back :
     { ready: say("Get ready"), move: say("Move now"), end: say("Thank you"), hold }[now.phase];
   by("calls").replaceChildren(...asked.map(words));
   by("care").hidden = now.phase !== "ready" && pausing !== "rest";
