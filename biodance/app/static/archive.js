@@ -1,5 +1,6 @@
 // All sessions of the folder: how each stands, sorted, filtered, searched; runs over those that are shown.
 import { ask, chips, h, say, tell } from "./dom.js";
+import { folderCopied } from "./drop.js";
 import { address } from "./main.js";
 
 const wanted = { search: "", state: "all", by: "name", down: false };
@@ -32,7 +33,8 @@ function folderChooser(found, page) {
         h(
           "div",
           { cls: "bar" },
-          told.above ? go(told.above, "One up") : told.roots.filter((one) => one !== told.folder).map((one) => go(one, one)),
+          told.above ? go(told.above, "One up") : "",
+          told.roots.filter((one) => one !== told.folder && one !== told.above).map((one) => go(one, one)),
           h("button", { cls: "main", "data-key": "open", onclick: () => openFolder(told.folder, page) }, "Open this folder"),
         ),
         h(
@@ -49,6 +51,7 @@ function folderChooser(found, page) {
     "details",
     { ontoggle: (event) => event.target.open && show(found.folder) },
     h("summary", { "data-key": "folder" }, "Another folder"),
+    h("div", { cls: "bar" }, folderCopied(page)),
     place,
   );
 }
@@ -170,6 +173,7 @@ export async function showArchive(main, page) {
         "Run those shown that are not done",
       ),
     ),
+    h("p", { cls: "small" }, "Drop the folder of a session anywhere here: it is copied, run, and its page shown."),
     folderChooser(found, page),
     count,
     h(

@@ -42,7 +42,7 @@ export async function tell(path, body) {
   return answered(await reached(`/api/${path}`, { method: "POST", headers, body: JSON.stringify(body) }));
 }
 
-async function reached(address, options) {
+export async function reached(address, options) {
   try {
     return await fetch(address, options);
   } catch {
@@ -53,7 +53,7 @@ async function reached(address, options) {
   }
 }
 
-async function answered(response) {
+export async function answered(response) {
   const text = await response.text();
   let found = null;
   try {
