@@ -82,8 +82,8 @@ def page_part(place: SessionPlace, part: str) -> str:
     if not kept:
         return _NOTHING
     shown = ", ".join(f"#{one}" for one in kept)
-    alone = f"<style>body > header, main > :not({shown}) {{ display: none; }}</style></head>"
-    return page.replace("</head>", alone, 1)
+    alone = f"body > header, main > :not({shown}) {{ display: none; }} body {{ padding-top: 0; }}"
+    return page.replace("</head>", f"<style>{alone} h2 {{ margin-top: 1rem; }}</style></head>", 1)
 
 
 _NOTHING = """<!doctype html><html lang="en"><title>biodance</title>

@@ -68,6 +68,7 @@ export async function answered(response) {
 export const number = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 export const words = (name) =>
   name.replace("trunk_head", "trunk with head").replace("forearm_hand", "forearm with hand").replaceAll("_", " ");
+export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
 export const chip = (text, kind = "") => h("span", { cls: `chip ${kind}` }, text);
 
 export function download(query, text) {
