@@ -2,6 +2,7 @@
 deadly, slow.
 """
 
+import errno
 import fcntl
 import json
 import os
@@ -95,6 +96,16 @@ def stuck(task: SessionTask) -> Outcome:
         (Path(task.out).parent / ".part-at-work").mkdir()
         signal.pause()
     return found
+
+
+def on_a_full_disk(task: SessionTask) -> Outcome:
+    """Go through a session as in earnest, on a disk that is full when its results are put in place."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", task.out)
+
+    work.put_in_place = full
+    return process_session(task)
 
 
 def wait_for_go(task: SessionTask) -> Outcome:

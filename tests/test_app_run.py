@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
-from batch_work import count, die_in_s2, stuck
+from batch_work import count, die_in_s2, on_a_full_disk, stuck
 
 from biodance.app.sessions import Archive, RunState, Worker
 from biodance.batch.run import Ledger
@@ -62,9 +62,21 @@ def test_a_refused_session_says_why(archive):
 def test_a_killed_process_costs_its_own_session_alone(archive):
     worker = Worker(archive, die_in_s2)
     worker.start([archive["s2"], archive["s3"]])
-    assert ended(worker)["state"] is RunState.FINISHED
+    told = ended(worker)
+    assert told["state"] is RunState.FINISHED
+    assert told["why"].startswith("s2: Its process was ended from outside 3 times")
     assert archive["s2"].found() is None
     assert archive["s3"].found()["status"] == "done"
+
+
+def test_a_full_disk_is_said_and_nothing_half_written_stays(archive, monkeypatch):
+    worker = Worker(archive, on_a_full_disk)
+    worker.start([archive["s0"]])
+    told = ended(worker)
+    assert told["state"] is RunState.FINISHED
+    assert "No space left on device" in told["why"]
+    assert archive["s0"].found() is None
+    assert not [*(archive.out / SESSIONS).iterdir()]
 
 
 def test_a_stop_kills_what_is_at_work_and_leaves_nothing_half_done(archive):

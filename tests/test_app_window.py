@@ -289,6 +289,25 @@ def test_another_folder_is_chosen_in_the_window(browser, archive):
     go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
 
 
+def test_a_dropped_folder_is_copied_run_and_its_page_shown(browser, archive, tmp_path):
+    stick = hidden(tmp_path / "S07", trials=("static", "squat_1"))
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
+    data = {"items": [], "files": [str(stick)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        browser.send("Input.dispatchDragEvent", type=kind, x=500, y=500, data=data)
+    browser.until("location.hash === '#/S07/gait'", 30)
+    browser.until("Boolean(document.querySelector('iframe'))", 240)
+    copy = archive.with_name(f"{archive.name}-results") / "dropped" / "S07"
+    assert (copy / "squat_1.c3d").read_bytes() == (stick / "squat_1.c3d").read_bytes()
+    assert complaints(browser, "main > :not(#panel)") == []
+    browser.send("Emulation.clearDeviceMetricsOverride")
+    browser.run(
+        f"fetch('/api/open', {{method: 'POST', headers: {{'Content-Type': 'application/json'}}, "
+        f"body: JSON.stringify({{folder: {str(archive)!r}}})}})"
+    )
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
+
+
 def test_nobody_is_shut_out_of_the_list_or_a_session_that_cannot_be_read(browser):
     go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
     assert complaints(browser) == []

@@ -49,6 +49,22 @@ def test_help_names_every_command_and_imports_nothing_heavy():
     assert all(f"│ {command} " in done.stdout for command in ("demo", "doctor", "inspect", "report", "simulate"))
 
 
+def test_help_is_in_groups_with_every_command_in_one_and_rare_options_apart(capsys):
+    run(["--help"])
+    own, session, laboratory, dances, advanced = capsys.readouterr().out.split("╭─ ")[1:]
+    assert "--version" in own
+    assert session.startswith("A session ─")
+    assert all(f"│ {name} " in session for name in ("app", "report", "compare"))
+    assert laboratory.startswith("A laboratory ─")
+    assert "│ dance " in dances
+    assert "│ identify " in advanced
+    run(["identify", "--help"])
+    usual, robots, rare = capsys.readouterr().out.split("╭─ ")[1:]
+    assert "--out" in usual
+    assert "--urdf" in robots
+    assert "--set" in rare
+
+
 def test_a_bad_session_is_reported_all_the_same(reported):
     done, out = reported
     assert done.returncode == NEEDS_A_PERSON, done.stderr

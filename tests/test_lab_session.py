@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_faults import hidden
 from lab_sessions import GRAVITY, MASS, plate, roles, said, table_of, two_trials, write_trial
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -121,6 +122,18 @@ def test_folder_without_a_session_is_refused(tmp_path, folder, wrong):
     }[wrong]
     with pytest.raises(SessionRefused, match=sentence):
         read_session(place)
+
+
+def test_a_single_c3d_file_is_a_session_with_what_session_toml_beside_it_says(tmp_path):
+    place = hidden(tmp_path / "S01", trials=("static", "squat_1"))
+    session = read_session(place / "squat_1.c3d")
+    whole = read_session(place)
+    assert roles(session) == {"squat_1": whole["squat_1"].role}
+    assert session.subject == whole.subject
+    assert session.folder == place
+    assert "squat_1.c3d was read alone." in session.notes
+    with pytest.raises(SessionRefused, match="no such folder"):
+        read_session(place / "squat_9.c3d")
 
 
 def test_parts_of_a_session_in_folders_of_their_own(tmp_path):

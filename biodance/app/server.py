@@ -8,7 +8,7 @@ SameSite=Strict, and whatever changes something must come from our own Origin).
 import hmac
 import secrets
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from importlib.resources import files
 from json import JSONDecodeError, loads
@@ -25,6 +25,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from biodance.app.dropped import received_folder
 from biodance.app.sessions import Archive, ChangedElsewhereError
 from biodance.app.window import Asked, Window
 from biodance.batch.run import prepare_workers
@@ -34,6 +35,8 @@ from biodance.report.pages.template import three_js
 
 LARGEST_BODY = 2**20
 """Bytes of a request: a session.toml has a few thousand."""
+LARGEST_DROP = 2**33
+"""Bytes of a folder that is dropped on the window."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "frame-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
@@ -76,9 +79,9 @@ class LoopbackGuard:
         """Return the answer to a request that is not let through; None for one that is."""
         if request.headers.get("host", "") not in self._hosts:
             return PlainTextResponse("This address answers to 127.0.0.1 alone.", 403)
-        # a write comes from the page of this server, as JSON, which no form can send
-        json = request.headers.get("content-type", "").startswith("application/json")
-        own = json and request.headers.get("origin", "") in [f"http://{host}" for host in self._hosts]
+        # a write comes from the page of this server, as JSON or a dropped folder, which no form can send
+        kind = request.headers.get("content-type", "").startswith(("application/json", "application/octet-stream"))
+        own = kind and request.headers.get("origin", "") in [f"http://{host}" for host in self._hosts]
         if request.method not in _READS and not own:
             return PlainTextResponse("Changes are taken from the window's own page alone.", 403)
         if self._same(request.cookies.get(self._cookie, "")):
@@ -108,6 +111,7 @@ def _with_headers(send: Send) -> Send:
 
 
 _PATIENCE = 10.0  # s that a request's body may take
+_PATIENCE_DROP = 600.0  # s that a dropped folder may take to arrive
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
@@ -132,11 +136,18 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
         *(window.edit, window.text, window.undo, window.redo, window.run, window.stop),
         *(window.correction, window.accept, window.keep, window.open, window.limits),
     )
+
+    async def dropped(request: Request) -> Asked:
+        window.refuse_while_running()
+        with anyio.fail_after(_PATIENCE_DROP):
+            return Asked({}, {"folder": str(await received_folder(request.stream(), window.dropped))})
+
     routes = [
         Route("/", static),
         Route("/static/{name}", static),
         Route("/page", _answered(window.page)),
         Route("/download", _answered(window.download)),
+        Route("/api/drop", _answered(window.drop, dropped), methods=["POST"], max_body_size=LARGEST_DROP),
         *(Route(f"/api/{one.__name__}", _answered(one)) for one in reads),
         *(Route(f"/api/{one.__name__}", _answered(one), methods=["POST"]) for one in writes),
     ]
@@ -150,17 +161,26 @@ def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGu
     return LoopbackGuard(application, token=token, port=port)
 
 
-def _answered(work: Callable[[Asked], Any]) -> Callable[[Request], Any]:
-    """Return an endpoint that does a ``work`` in a thread and answers what it returns, or with a sentence why not."""
+async def _read(request: Request) -> Asked:
+    """Return what a request asks."""
+    with anyio.fail_after(_PATIENCE):
+        body = await request.body()
+    asked = Asked(dict(request.query_params), loads(body) if body else {})
+    if not isinstance(asked.body, Mapping):
+        raise BiodanceError("The body must be a JSON object.")
+    return asked
+
+
+def _answered(
+    work: Callable[[Asked], Any], read: Callable[[Request], Awaitable[Asked]] = _read
+) -> Callable[[Request], Any]:
+    """Return an endpoint that does a ``work`` in a thread on what it reads of a request, and answers what that returns,
+    or with a sentence why not.
+    """
 
     async def endpoint(request: Request) -> Response:
         try:
-            with anyio.fail_after(_PATIENCE):
-                body = await request.body()
-            asked = Asked(dict(request.query_params), loads(body) if body else {})
-            if not isinstance(asked.body, Mapping):
-                return _told("The body must be a JSON object.", 400)
-            found = await run_in_threadpool(work, asked)
+            found = await run_in_threadpool(work, await read(request))
             return found if isinstance(found, Response) else JSONResponse(found)
         except HTTPException:  # the body is larger than it may be
             raise

@@ -19,7 +19,16 @@ from tomlkit.items import AbstractTable
 
 from biodance.batch.run import Ledger, Work, run_here, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
-from biodance.batch.work import OUTCOME, PART, TABLES, SessionTask, clear_up, fingerprint_of, process_session
+from biodance.batch.work import (
+    OUTCOME,
+    PART,
+    TABLES,
+    SessionTask,
+    Why,
+    clear_up,
+    fingerprint_of,
+    process_session,
+)
 from biodance.errors import BiodanceError, FileRefused, refuse_unknown
 from biodance.lab.plain_text import write_whole
 from biodance.lab.session.archive import archive_folders, visit_date
@@ -331,7 +340,9 @@ class RunState(StrEnum):
 
 @dataclass
 class SessionRun:
-    """One run over the sessions ``names``: its ``state``, those ``done``, and ``why`` it failed."""
+    """One run over the sessions ``names``: its ``state``, those ``done``, and ``why`` it failed, or the machine failed
+    some of them.
+    """
 
     names: tuple[str, ...]
     began: float = field(default_factory=time.monotonic)
@@ -390,6 +401,8 @@ class Worker:
                     for task, outcome in finished:
                         ledger.write(outcome)
                         run.done.append(task.name)
+                        if outcome.why is Why.MACHINE:  # perhaps no folder of its own tells it
+                            run.why = f"{run.why} {task.name}: {outcome.reason}".strip()
                 clear_up(self._archive.out / SESSIONS)
             state = RunState.STOPPED if run.stop.is_set() else RunState.FINISHED
         except BiodanceError as error:

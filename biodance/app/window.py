@@ -82,8 +82,8 @@ def page_part(place: SessionPlace, part: str) -> str:
     if not kept:
         return _NOTHING
     shown = ", ".join(f"#{one}" for one in kept)
-    alone = f"<style>body > header, main > :not({shown}) {{ display: none; }}</style></head>"
-    return page.replace("</head>", alone, 1)
+    alone = f"body > header, main > :not({shown}) {{ display: none; }} body {{ padding-top: 0; }}"
+    return page.replace("</head>", f"<style>{alone} h2 {{ margin-top: 1rem; }}</style></head>", 1)
 
 
 _NOTHING = """<!doctype html><html lang="en"><title>biodance</title>
@@ -203,6 +203,8 @@ def keep_acceptance(place: SessionPlace, out: Path) -> Path:
     return kept
 
 
+DROPPED = "dropped"
+"""Folder of copies of what was dropped on a window, in that of the results."""
 _SANDBOX = "sandbox allow-scripts allow-popups allow-modals; frame-ancestors 'self'"
 """What a page of results may do in a tab: run its own scripts, and reach nothing of the window's."""
 
@@ -228,6 +230,7 @@ class Window:
     def __init__(self, archive: Archive) -> None:
         self.archive, self.worker = archive, Worker(archive)
         self._roots = tuple(dict.fromkeys(one.resolve() for one in (Path.home(), archive.out, archive.folder)))
+        self.dropped = archive.out / DROPPED
         self._view: SessionView | None = None
         self._lock, self._one_export = Lock(), Lock()
 
@@ -245,11 +248,21 @@ class Window:
         """Show the sessions of another folder; its results go beside it."""
         folder = allowed_folder(asked.text("folder"), self._roots)
         with self._lock:
-            if self.worker.running:
-                raise BiodanceError("A run is not finished. Wait for it, or stop it, before another folder is opened.")
+            self.refuse_while_running()
             archive = Archive(folder, results_beside(folder))
             self.archive, self.worker, self._view = archive, Worker(archive), None
         return self.listed(asked)
+
+    def drop(self, asked: Asked) -> dict[str, Any]:
+        """Show what was ever dropped on the window, with the ``names`` of the sessions in the ``folder`` of now."""
+        folder = Path(asked.text("folder"))
+        told = self.open(Asked({}, {"folder": str(self.dropped)}))
+        return told | {"names": [one.name for one in self.archive if one.folder.is_relative_to(folder)]}
+
+    def refuse_while_running(self) -> None:
+        """Raise BiodanceError while a run is not finished: its results belong to the folder that is open."""
+        if self.worker.running:
+            raise BiodanceError("A run is not finished. Wait for it, or stop it, before another folder is opened.")
 
     def session(self, asked: Asked) -> dict[str, Any]:
         """Return one session as it is read now."""

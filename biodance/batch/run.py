@@ -122,7 +122,10 @@ def _killed(task: SessionTask) -> Outcome:
 def prepare_workers() -> None:
     """Start the process from which workers are forked, and let it load what every session needs."""
     multiprocessing.get_context("forkserver").set_forkserver_preload(
-        ["biodance.pipeline.front", "biodance.report.write", "scipy.signal"]
+        [
+            *("biodance.pipeline.front", "biodance.pipeline.diagnosis", "biodance.report.write"),
+            *("scipy.signal", "clarabel", "jinja2", "numba", "pandas", "pyarrow.csv", "pyarrow.parquet"),
+        ]
     )
     start_forkserver()
 

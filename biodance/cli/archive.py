@@ -11,7 +11,7 @@ from biodance.cli.session import put_results
 from biodance.errors import without_codes
 
 
-@shared.app.command(name="batch")
+@shared.app.command(name="batch", group=shared.LABORATORY)
 def batch_command(
     archive: Path,
     *,
@@ -57,7 +57,7 @@ def batch_command(
     return shared.NEEDS_A_PERSON if found.needs_a_person else shared.DONE
 
 
-@shared.app.command(name="plates")
+@shared.app.command(name="plates", group=shared.LABORATORY)
 def plates_command(
     archive: Path, *, out: shared.OutOption, json: shared.JsonOption = False, force: shared.ForceOption = False
 ) -> int:
@@ -83,7 +83,7 @@ def plates_command(
     return shared.NEEDS_A_PERSON if found.judgement.findings or found.refused else shared.DONE
 
 
-@shared.app.command(name="learn")
+@shared.app.command(name="learn", group=shared.LABORATORY)
 def learn_command(
     archive: Path,
     *,
@@ -116,7 +116,7 @@ def learn_command(
     return shared.NEEDS_A_PERSON if found.left_out else shared.DONE
 
 
-@shared.app.command(name="verify")
+@shared.app.command(name="verify", group=shared.EVERYDAY)
 def verify_command(place: Path, *, json: shared.JsonOption = False) -> int:
     """Check, years later too, that results are whole, of one run, and of the recordings as they lie there now.
 

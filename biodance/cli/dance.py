@@ -63,7 +63,7 @@ class DanceAsked:
 USUAL_DANCE, USUAL_LEADING = DanceAsked(), LeadingOptions()
 
 
-@shared.app.command(name="dance")
+@shared.app.command(name="dance", group=shared.DANCES)
 def dance_command(
     *,
     asked: DanceAsked = USUAL_DANCE,
@@ -126,7 +126,7 @@ def dance_command(
     return shared.DONE if result.settled else shared.NEEDS_A_PERSON
 
 
-@shared.app.command(name="limits")
+@shared.app.command(name="limits", group=shared.DANCES)
 def limits_command(
     *,
     template: Annotated[
@@ -148,7 +148,7 @@ def limits_command(
     return shared.DONE
 
 
-@shared.app.command(name="feedback")
+@shared.app.command(name="feedback", group=shared.DANCES)
 def feedback_command(
     dance: Path,
     *,
@@ -180,7 +180,7 @@ def feedback_command(
     return shared.DONE
 
 
-@shared.app.command(name="play")
+@shared.app.command(name="play", group=shared.DANCES)
 def play_command(
     dance: Path,
     *,
@@ -287,7 +287,7 @@ class Drawn:
     ] = None
 
 
-@shared.app.command(name="simulate")
+@shared.app.command(name="simulate", group=shared.ADVANCED)
 def simulate_command(
     *,
     protocol: str | None = None,
@@ -324,7 +324,7 @@ def simulate_command(
     return shared.DONE
 
 
-@shared.app.command(name="effects")
+@shared.app.command(name="effects", group=shared.ADVANCED)
 def effects_command(name: str | None = None, *, json: shared.JsonOption = False) -> int:
     """List the causes of disagreement that are looked for: parameters with units, and which can be simulated.
 
@@ -342,7 +342,7 @@ def effects_command(name: str | None = None, *, json: shared.JsonOption = False)
     return shared.DONE
 
 
-@shared.app.command(name="demo")
+@shared.app.command(name="demo", group=shared.EVERYDAY)
 def demo_command(*, out: shared.OutOption = Path("demo"), force: shared.ForceOption = False) -> int:
     """Simulate a short session with known true values, and report it like a real one."""
     from biodance.lab.session.read import read_session

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.live import LiveState
 
 
-@shared.app.command(name="register")
+@shared.app.command(name="register", group=shared.LABORATORY)
 def register_command(
     markers: Path,
     forces: Path,
@@ -57,7 +57,7 @@ def register_command(
     return shared.DONE
 
 
-@shared.app.command(name="doctor")
+@shared.app.command(name="doctor", group=shared.EVERYDAY)
 def doctor_command(*, json: shared.JsonOption = False) -> int:
     """Check the installation, and explain how to fix what does not work."""
     from dataclasses import asdict
@@ -71,7 +71,7 @@ def doctor_command(*, json: shared.JsonOption = False) -> int:
     return shared.DONE if all(finding.works for finding in findings if finding.needed) else shared.NEEDS_A_PERSON
 
 
-@shared.app.command(name="init")
+@shared.app.command(name="init", group=shared.EVERYDAY)
 def init_command(session: Path, *, subject: str | None = None, json: shared.JsonOption = False) -> int:
     """Create session.toml with the detected and guessed metadata of a session (subject, trial roles, markers, plates)
     for review. An existing session.toml is never overwritten.
@@ -91,7 +91,7 @@ def init_command(session: Path, *, subject: str | None = None, json: shared.Json
     return shared.NEEDS_A_PERSON if found["refused"] or not found["marker_set"] else shared.DONE
 
 
-@shared.app.command(name="inspect")
+@shared.app.command(name="inspect", group=shared.EVERYDAY)
 def inspect_command(
     *paths: Path,
     subject: shared.SubjectOption = None,
@@ -119,7 +119,7 @@ def inspect_command(
     return shared.NEEDS_A_PERSON if states - {"ok"} else shared.DONE
 
 
-@shared.app.command
+@shared.app.command(group=shared.ADVANCED)
 def settings(session: Path | None = None, *, chosen: shared.Set = (), json: shared.JsonOption = False) -> int:
     """Print all settings with value, unit, meaning and allowed range, in the format of session.toml.
 
@@ -129,10 +129,10 @@ def settings(session: Path | None = None, *, chosen: shared.Set = (), json: shar
         Session folder; the settings of its session.toml are applied.
     """
     from biodance.lab.session.file import read_session_file
-    from biodance.lab.session.read import session_folder
+    from biodance.lab.session.read import session_place
     from biodance.settings import USUAL, assignments
 
-    usual = read_session_file(session_folder(session)).settings if session else USUAL
+    usual = read_session_file(session_place(session)[1]).settings if session else USUAL
     found = usual.changed(assignments(chosen))
     if json:
         shared.print_json([row._asdict() for row in found.all()])
@@ -141,7 +141,7 @@ def settings(session: Path | None = None, *, chosen: shared.Set = (), json: shar
     return shared.DONE
 
 
-@shared.app.command(name="export")
+@shared.app.command(name="export", group=shared.EVERYDAY)
 def export_command(
     source: Path,
     *,
@@ -185,7 +185,7 @@ def export_command(
     return shared.DONE
 
 
-@shared.app.command(name="live")
+@shared.app.command(name="live", group=shared.LABORATORY)
 def live_command(
     file: Path,
     *,
@@ -242,7 +242,7 @@ def live_command(
     return shared.NEEDS_A_PERSON if found.warnings or found.cause else shared.DONE
 
 
-@shared.app.command(name="app")
+@shared.app.command(name="app", group=shared.EVERYDAY)
 def app_command(
     folder: Path | None = None,
     *,

@@ -106,7 +106,7 @@ def follow_with_reference(
     return followed(recording, reference=before, known=known, tell=tell), before, place
 
 
-@shared.app.command(name="report")
+@shared.app.command(name="report", group=shared.EVERYDAY)
 def report_command(
     session: Path,
     *,
@@ -126,7 +126,7 @@ def report_command(
     Parameters
     ----------
     session
-        Session folder: the static trial and the other trials.
+        Session folder: the static trial and the other trials; or one C3D file.
     """
     from biodance.report.pages.language import ENGLISH, read_language
 
@@ -144,7 +144,7 @@ def report_command(
     return print_reported(result, folder, found, results.json)
 
 
-@shared.app.command(name="compare")
+@shared.app.command(name="compare", group=shared.EVERYDAY)
 def compare_command(
     *visits: Path,
     out: shared.OutOption,
@@ -195,7 +195,7 @@ def put_session(place: "ResultsFolder", session: "Session") -> Path:
     return put_results(place, session.folder, session.trials, session.settings)
 
 
-@shared.app.command(name="foresee")
+@shared.app.command(name="foresee", group=shared.DANCES)
 def foresee_command(
     dance: Path,
     *,
@@ -231,7 +231,7 @@ def foresee_command(
     return shared.DONE
 
 
-@shared.app.command(name="diagnose")
+@shared.app.command(name="diagnose", group=shared.ADVANCED)
 def diagnose_command(
     session: Path,
     *,
@@ -252,7 +252,8 @@ def diagnose_command(
     Parameters
     ----------
     session
-        Session folder: the static trial and the other trials. For a robot (--urdf): as for `biodance identify`.
+        Session folder: the static trial and the other trials; or one C3D file. For a robot (--urdf): as for `biodance
+        identify`.
     """
     if robot.given:
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
@@ -304,7 +305,7 @@ def examine_robot(
     return result, folder, found
 
 
-@shared.app.command(name="identify")
+@shared.app.command(name="identify", group=shared.ADVANCED)
 def identify_command(
     session: Path,
     *,
@@ -325,8 +326,8 @@ def identify_command(
     Parameters
     ----------
     session
-        Session folder: the static trial and the other trials. For a robot (--urdf): encoder tables (CSV or Parquet;
-        s, rad) and force plate files.
+        Session folder: the static trial and the other trials; or one C3D file. For a robot (--urdf): encoder tables
+        (CSV or Parquet; s, rad) and force plate files.
     """
     if robot.given:
         given = {"--dance": dance, "--tables": results.tables, "--method": None if method == "posterior" else method}

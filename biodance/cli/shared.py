@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import App, Parameter, Token
+from cyclopts import App, Group, Parameter, Token
 
 from biodance.errors import without_codes
 from biodance.version import __version__
@@ -29,6 +29,14 @@ app = App(
     suppress_keyboard_interrupt=False,
     default_parameter=Parameter(negative=""),
 )
+EVERYDAY = Group("A session", sort_key=1)
+LABORATORY = Group("A laboratory", sort_key=2)
+DANCES = Group("Dances: movements that tell most", sort_key=3)
+ADVANCED = Group("Advanced: single stages, simulation, settings", sort_key=4)
+"""Groups of commands in the help."""
+_ROBOTS = Group("Robots", sort_key=8)
+_RARE = Group("Advanced", sort_key=9)
+"""Groups of options, after those of every day."""
 
 
 def say(sentence: str) -> None:
@@ -99,7 +107,7 @@ SubjectOption = Annotated[
 ]
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=_RARE)
 @dataclass(frozen=True, kw_only=True)
 class Reading:
     """Options for reading a session: subject, marker set, settings, and what earlier sessions left."""
@@ -164,7 +172,7 @@ class PersonFacts:
 NOBODY = PersonFacts()
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=_ROBOTS)
 @dataclass(frozen=True, kw_only=True)
 class RobotFile:
     """The robot instead of a person: its file, its feet, and what to do about a link that is no possible body."""

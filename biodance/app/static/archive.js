@@ -1,5 +1,6 @@
 // All sessions of the folder: how each stands, sorted, filtered, searched; runs over those that are shown.
-import { ask, chips, h, say, tell } from "./dom.js";
+import { ask, chips, counted, h, say, tell } from "./dom.js";
+import { folderCopied } from "./drop.js";
 import { address } from "./main.js";
 
 const wanted = { search: "", state: "all", by: "name", down: false };
@@ -32,7 +33,8 @@ function folderChooser(found, page) {
         h(
           "div",
           { cls: "bar" },
-          told.above ? go(told.above, "One up") : told.roots.filter((one) => one !== told.folder).map((one) => go(one, one)),
+          told.above ? go(told.above, "One up") : "",
+          told.roots.filter((one) => one !== told.folder && one !== told.above).map((one) => go(one, one)),
           h("button", { cls: "main", "data-key": "open", onclick: () => openFolder(told.folder, page) }, "Open this folder"),
         ),
         h(
@@ -49,6 +51,7 @@ function folderChooser(found, page) {
     "details",
     { ontoggle: (event) => event.target.open && show(found.folder) },
     h("summary", { "data-key": "folder" }, "Another folder"),
+    h("div", { cls: "bar" }, folderCopied(page)),
     place,
   );
 }
@@ -86,7 +89,8 @@ export async function showArchive(main, page) {
     );
   const draw = () => {
     const rows = shown();
-    count.textContent = `${rows.length} of ${found.rows.length} sessions`;
+    count.textContent = `${rows.length} of ${counted(found.rows.length, "session")}`;
+    all.disabled = found.run?.state === "running" || !rows.some(isOpen);
     body.replaceChildren(
       ...rows.map((row) =>
         h(
@@ -127,6 +131,8 @@ export async function showArchive(main, page) {
       say(error.message);
     }
   };
+  const isOpen = (row) => !["done", "needs a person"].includes(stateOf(row)),
+    all = h("button", { cls: "push", onclick: () => run(shown().filter(isOpen)) }, "Run those shown that are not done");
   main.replaceChildren(
     h("h1", {}, "Sessions"),
     h(
@@ -160,16 +166,9 @@ export async function showArchive(main, page) {
           states.map((one) => h("option", { value: one, selected: one === wanted.state }, one)),
         ),
       ),
-      h(
-        "button",
-        {
-          cls: "push",
-          disabled: found.run?.state === "running",
-          onclick: () => run(shown().filter((row) => stateOf(row) !== "done" && stateOf(row) !== "needs a person")),
-        },
-        "Run those shown that are not done",
-      ),
+      all,
     ),
+    h("p", { cls: "small" }, "Drop the folder of a session anywhere here: it is copied, run, and its page shown."),
     folderChooser(found, page),
     count,
     h(

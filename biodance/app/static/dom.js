@@ -42,7 +42,7 @@ export async function tell(path, body) {
   return answered(await reached(`/api/${path}`, { method: "POST", headers, body: JSON.stringify(body) }));
 }
 
-async function reached(address, options) {
+export async function reached(address, options) {
   try {
     return await fetch(address, options);
   } catch {
@@ -53,7 +53,7 @@ async function reached(address, options) {
   }
 }
 
-async function answered(response) {
+export async function answered(response) {
   const text = await response.text();
   let found = null;
   try {
@@ -68,6 +68,7 @@ async function answered(response) {
 export const number = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 export const words = (name) =>
   name.replace("trunk_head", "trunk with head").replace("forearm_hand", "forearm with hand").replaceAll("_", " ");
+export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
 export const chip = (text, kind = "") => h("span", { cls: `chip ${kind}` }, text);
 
 export function download(query, text) {

@@ -1,6 +1,7 @@
 // The window: which page is shown (the address behind #), what runs, and whether another tab changed something.
 import { showArchive } from "./archive.js";
 import { ask, h, say, tell } from "./dom.js";
+import { takeDrops } from "./drop.js";
 import { showLimits } from "./limits.js";
 import { showSession } from "./session.js";
 
@@ -61,7 +62,6 @@ function showRun(run) {
 }
 
 async function look() {
-  // every two seconds, sooner while something runs
   try {
     const mine = page.busy, // what a change of ours does is no other's doing
       about = page.name,
@@ -69,7 +69,7 @@ async function look() {
     const before = page.run;
     page.run = found.run;
     showRun(found.run);
-    if (found.run?.state === "failed" && before?.state === "running") say(found.run.why);
+    if (found.run?.why && found.run.state !== "running" && before?.state !== found.run.state) say(found.run.why);
     const idle = !mine && !page.busy && about === page.name;
     if (idle && page.name && page.revision && found.revision !== page.revision) {
       say("session.toml was changed elsewhere, in another tab or an editor. It is shown as it is now.");
@@ -86,7 +86,17 @@ async function look() {
   }
 }
 
-setInterval(look, 1500);
+let passed = 0,
+  looking = false;
+setInterval(async () => {
+  // every 1.5 s, while something runs every 0.3 s: its page is there as soon as it is made
+  passed += 1;
+  if (looking || (passed % 5 && page.run?.state !== "running")) return;
+  looking = true;
+  await look();
+  looking = false;
+}, 300);
+takeDrops(page);
 addEventListener("hashchange", () => {
   say("");
   show();

@@ -7,12 +7,14 @@ import { textEditor } from "./session.js";
 
 const CHANNELS = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
 
-async function resultsOf({ panel, view, name }) {
+async function resultsOf({ panel, view, name, page }) {
+  const running = page.run?.state === "running" && page.run.names.includes(name);
+  if (running) put(panel, h("p", { cls: "guess-word" }, "It runs now. What it finds comes here by itself."));
   if (!view.found) {
-    put(panel, h("p", {}, "This session has not been run yet. Press Run."));
+    if (!running) put(panel, h("p", {}, "This session has not been run yet. Press Run."));
     return null;
   }
-  if (!view.found.fresh)
+  if (!view.found.fresh && !running)
     put(panel, h("p", { cls: "guess-word" }, "Something changed since this run. Run again to see what it changes."));
   try {
     return await ask("results", { name });

@@ -136,7 +136,11 @@ export async function showSession(main, page, name, tab) {
         h("p", {}, "Correct session.toml here, or the folder, and it is read again."),
         textEditor(now, changed),
       );
-    } else await TABS[tab]({ panel, view: now, name, edit, changed, page });
+    } else {
+      const loading = put(panel, h("p", { cls: "small" }, "Loading …")).lastChild;
+      await TABS[tab]({ panel, view: now, name, edit, changed, page });
+      loading.remove();
+    }
     if (kept) main.querySelector(`[data-key="${CSS.escape(kept)}"]`)?.focus();
   }
   await draw(view);

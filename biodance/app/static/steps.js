@@ -312,6 +312,7 @@ function timeLine(row, forces, editor, onspan) {
     return h("rect", { x: from, y: HIGH + (side === "left" ? ROW : 2 * ROW) - 8, width, height: ROW, fill });
   });
   forces.plates.forEach((one, k) => {
+    const colour = ["#1b1b1b", "#6b6b6b", "#8a5a00", "#00694b"][k % 4];
     const pieces = one.time_s.map((t, i) =>
       one.force_n[i] === null ? null : `${x(t).toFixed(1)} ${y(one.force_n[i]).toFixed(1)}`,
     );
@@ -320,11 +321,11 @@ function timeLine(row, forces, editor, onspan) {
       h("path", {
         d: path || "M0 0",
         fill: "none",
-        stroke: ["#1b1b1b", "#6b6b6b", "#8a5a00", "#00694b"][k % 4],
+        stroke: colour,
         "stroke-width": 1.5,
       }),
     );
-    parts.push(h("text", { x: 6, y: 16 + 14 * k, fill: "#1b1b1b" }, one.name));
+    parts.push(h("text", { x: 6, y: 16 + 14 * k, fill: colour }, one.name));
   });
   for (const one of editor.events)
     parts.push(

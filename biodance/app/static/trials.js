@@ -1,6 +1,6 @@
 // Who was measured, what every recording is for, and the plates on the floor. What was guessed is orange until somebody
 // says so in session.toml.
-import { chip, h, number, put, words } from "./dom.js";
+import { chip, counted, h, number, put, words } from "./dom.js";
 import { showPlates } from "./plates.js";
 
 const LIMBS = ["right", "left"].flatMap((side) =>
@@ -179,7 +179,7 @@ function trialRow(row, view, edit) {
         ? h(
             "details",
             {},
-            h("summary", {}, `${row.warnings.length} warnings`),
+            h("summary", {}, counted(row.warnings.length, "warning")),
             h(
               "ul",
               {},
@@ -207,7 +207,7 @@ export function showTrials({ panel, view, edit }) {
       h(
         "button",
         { disabled: !guesses.length, onclick: () => edit(...guesses), "data-key": "accept" },
-        guesses.length ? `Accept the ${guesses.length} guesses shown in orange` : "Nothing is guessed",
+        guesses.length ? `Accept the ${counted(guesses.length, "guess", "guesses")} shown in orange` : "Nothing is guessed",
       ),
     ),
     h(

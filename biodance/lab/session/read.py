@@ -69,7 +69,7 @@ def read_session(
     Parameters
     ----------
     folder : str or pathlib.Path
-        With the recordings of one visit, and session.toml where there is one.
+        With the recordings of one visit, and session.toml where there is one; or one C3D file, which is read alone.
     subject_name : str, optional
         Chooses the person in C3D files that hold several.
     settings : Settings or mapping, optional
@@ -105,12 +105,12 @@ def read_session(
     >>> session.settings
     Settings(filter.cutoff=6.0)
     """
-    folder = session_folder(folder)
+    place, folder = session_place(folder)
     file_says = read_session_file(folder)
     chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
     worn = str(markers) if markers is not None else file_says.marker_set
     marker_set = read_marker_set(worn) if worn else None
-    files, notes = recordings.find_recordings(folder, readers)
+    files, notes = recordings.find_recordings(place, readers)
     eclipse, measurements, refused = recordings.vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons, labels = dict[str, str](), set[str]()
@@ -155,16 +155,21 @@ def read_session(
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 
-def session_folder(folder: str | Path) -> Path:
-    """Return the path of a session, with a name also where it is "."; SessionRefused if it is missing or no folder."""
+def session_place(folder: str | Path) -> tuple[Path, Path]:
+    """Return what is read, a folder or one C3D file, and its folder, with a name also where it is "."; SessionRefused
+    if it is missing or something else.
+    """
     folder = Path(folder)
+    if folder.is_file() and folder.suffix.lower() == ".c3d":
+        return folder, session_place(folder.parent)[1]
     if not folder.exists():
         raise SessionRefused(f"{folder}: there is no such folder. Check the path.")
     if not folder.is_dir():
         raise SessionRefused(
             f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder."
         )
-    return folder.resolve() if folder.name in ("", "..") else folder
+    named = folder.resolve() if folder.name in ("", "..") else folder
+    return named, named
 
 
 def _role(

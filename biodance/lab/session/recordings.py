@@ -176,13 +176,15 @@ _OWN_FILES = ("session.toml", "subject.toml")
 
 
 def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[Path], list[str]]:
-    """Return the recordings of a session, sorted by name, and notes on what was left aside.
+    """Return the recordings of a session, sorted by name, and notes on what was left aside; a file is read alone.
 
     They lie in the folder itself and in its parts (folders such as ``Static``, ``Straight``, ``MarkerData``). Folders
     that are sessions of their own (a static trial and others, or a session.toml, in more than one place) are left aside
     and named. A table of forces that belongs to a .trc file is no recording of its own; of one trial in several formats
     the C3D file is taken; text that holds no table of numbers is none.
     """
+    if folder.is_file():
+        return [folder], [f"{folder.name} was read alone."]
     files, order = recordings_in(folder, readers), list(extensions(readers))
     more, notes = _in_parts(folder, files, readers)
     kept: dict[tuple[Path, str], Path] = {}

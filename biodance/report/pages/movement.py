@@ -134,7 +134,9 @@ def _flags(found: Repetitions) -> list[str]:
     for because, said in _BECAUSE.items():
         some = [one for one in found.left_out if one.because is because]
         if some:
-            trials = ", ".join(dict.fromkeys(one.cycle.trial for one in some))
+            names = dict.fromkeys(one.cycle.trial for one in some)
+            everywhere = len(names) > 2 and names.keys() == {one.trial for one in found.cycles}
+            trials = "all trials" if everywhere else ", ".join(names)
             what = ", ".join(dict.fromkeys(spaced(one.quantity) for one in some if because is LeftOutBecause.SPIKE))
             told.append(f"{said.format(n=len(some))}{f' ({what})' if what else ''}: {trials}")
     if found.speeds:

@@ -124,14 +124,14 @@
     }
   }
 
-  function figure(root) {
+  function figure(root, k) {
     const panels = [...root.querySelectorAll(".panel")].map((svg) => new Panel(svg));
     const cells = [...root.querySelectorAll(".cell")].map((cell) => panels.filter((p) => cell.contains(p.svg)));
     const reading = root.querySelector(".reading");
     const [low, high] = panels[0].x, trial = root.dataset.trial || "";
     let at = null;
     root.classList.add("live");
-    reading.textContent = "Point to read values; drag to zoom; double click to see all.";
+    if (k === 0) reading.textContent = "Point to read values; drag to zoom; double click to see all.";
 
     const zoom = document.createElement("span");
     zoom.className = "zoom";
