@@ -119,6 +119,16 @@ def test_what_is_strange_is_no_alarm_before_a_limit_is_broken(reasons: tuple[Rea
         assert "It resembles plate gain Fz (gain 6 ± 0.4 %), which is not enough." in found.notes
 
 
+@pytest.mark.parametrize("reason", [Reason.OUTSIDE_TOLERANCES, Reason.NOT_SURE, Reason.CONTRADICTED])
+def test_a_broken_limit_leads_whatever_else_nobody_can_tell(reason: Reason) -> None:
+    check = Check("force difference", "walk", "15.0 % of weight", "at most 8 %", False, "Look at it.")
+    unsure = replace(WHOLE, explained=False, why={reason: ()})
+    for checks, begins in (((check,), "Something is wrong"), ((), "Nobody can tell")):
+        found = reconcile_with_checks(unsure, replace(CALM, checks=checks), (STATIC,))
+        assert found.attention[0].text.startswith(begins)
+    assert "15.0 % of weight" in reconcile_with_checks(unsure, replace(CALM, checks=(check,)), ()).attention[0].text
+
+
 @pytest.mark.parametrize(
     ("verdict", "judged", "then"),
     [

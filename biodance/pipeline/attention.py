@@ -202,10 +202,12 @@ def _without_faults(
         steps = any(row.seconds > 0 for row in judged if row.trial in compared - static_trials(result))
         well = not (one.why or one.resembles) and steps
         one = replace(one, explained=well, why={**one.why, Reason.NOT_COMPARED: ()})
-    if one.explained and (against := _not_clean(result, judged, outside)):
-        one = replace(one, explained=False, why={**against, **one.why})
-    if one.explained:
+    against = _not_clean(result, judged, outside)
+    if one.explained and not against:
         return one
+    # Whatever else nobody can tell, a broken limit is something wrong.
+    broken = {reason: about for reason, about in against.items() if one.explained or reason is Reason.LIMIT_BROKEN}
+    one = replace(one, explained=False, why={**broken, **one.why})
     if not any(row.seconds > 0 for row in judged):
         one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
     if any(step.name == "subject" and step.status != "done" for step in result.steps):
