@@ -227,13 +227,15 @@ def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, fl
 
 
 def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
-    """Return the mass kg and its sd by the force (T,) N, spans weighted by their own sd; NaN without one."""
-    weights = trunk.weights(gravity)
-    if not weights:
+    """Return the mass kg and its sd by the force (T,) N, spans weighted by their own sd; NaN without one that weighs
+    anything.
+    """
+    told = [(float(weight @ force[span]), sd) for span, weight, sd in trunk.weights(gravity)]
+    masses, relative = np.array([one for one in told if one[0] > 0]).reshape(-1, 2).T
+    if not masses.size:
         return float("nan"), float("nan")
-    masses = np.array([weight @ force[span] for span, weight, _ in weights])
     # Inverse variances: relative sd times the mass that each span weighs.
-    share = (np.abs(masses) * [sd for *_, sd in weights]) ** -2
+    share = (masses * relative) ** -2
     return float(share @ masses / share.sum()), float(max(share.sum() ** -0.5, _WEIGHED * np.mean(masses)))
 
 
