@@ -85,6 +85,12 @@ def test_a_cause_matters_from_its_least_size_on(name, target, small, large) -> N
     assert matters(one, np.array(large))
 
 
+@pytest.mark.parametrize("joint", ["trunk_joint", "head_joint", "shoulder_girdle"])
+def test_a_joint_that_the_markers_do_not_show_moving_does_not_matter(joint) -> None:
+    assert not matters(effects()[joint], np.array([0.0, 0.3]))
+    assert matters(effects()[joint], np.array([0.25, 0.0]))
+
+
 def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
     one = inferred(body(), windows(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
     assert one.diagnosis.verdict == "nothing wrong"
