@@ -23,12 +23,12 @@ def perfect():
 
 
 def test_a_body_that_is_true_follows_its_markers_and_needs_the_measured_wrench(perfect):
+    inner = slice(30, -30)
     for trial in perfect.trials:
         assert [step.status for step in trial.steps] == ["done"] * len(trial.steps)
         assert trial.fit.total_max < 1e-4
-        assert trial.comparison.used.all()
+        assert trial.comparison.used[inner].all()
     swing = perfect.trials[1].comparison
-    inner = slice(30, -30)
     difference = (swing.measured - swing.simulated)[inner]
     assert np.sqrt(np.mean(difference**2, axis=0)).max() < 0.2
     assert swing.correlation[[0, 2, 4]].min() > 0.98

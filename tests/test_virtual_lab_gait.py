@@ -136,7 +136,8 @@ def test_the_flight_of_a_runner_is_found(recorded: dict) -> None:
     for one in runs:
         empty = one.comparison.measured[:, 2] < 20
         assert 0.15 < empty.mean() < 0.4
-        assert one.comparison.used[empty].mean() > 0.97
+        away = slice(20, -20)  # from the ends, where the low-pass makes up the acceleration
+        assert one.comparison.used[away][empty[away]].mean() > 0.97
 
 
 def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded: dict) -> None:
