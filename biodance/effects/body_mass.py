@@ -10,8 +10,8 @@ from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, S
 from biodance.records import Array
 
 WRONG = 0.3
-"""Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all. A guess,
-or what plates weigh that are under test themselves, has it as its standard deviation.
+"""Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all. A guess
+has it as its standard deviation.
 """
 _LEAST = 0.3
 """kg that matter: clinic scale and clothes, 0.2 kg."""

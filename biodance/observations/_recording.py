@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.effects.body_mass import WRONG
 from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.upright import is_still
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
@@ -21,8 +22,8 @@ from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
-_DECLARED, _GUESSED = 0.01, 0.3
-"""Share of the mass by which careful declarations are wrong (clothes, shoes, another day), and a guess may be."""
+_DECLARED = 0.01
+"""Share of the mass by which careful declarations are wrong: clothes, shoes, another day."""
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
 _SHORTEST, _LONGEST = 0.2, 2.5
@@ -142,7 +143,7 @@ class SeenTrial:
     @property
     def mass_doubt(self) -> float:
         """Standard deviation of the mass, kg."""
-        return (_DECLARED if self.declared else _GUESSED) * self.mass
+        return (_DECLARED if self.declared else WRONG) * self.mass
 
     @property
     def one_clock(self) -> bool:

@@ -13,7 +13,7 @@ from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.discovery import Chosen
 from biodance.effects import Cause, CheckKind, DiscreteEffect, Effect, Recorded, causes, check_quality
 from biodance.effects.added_mass import AddedMass
-from biodance.effects.body_mass import WRONG, BodyMass
+from biodance.effects.body_mass import BodyMass
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.unloaded_body import expect_unloaded
@@ -26,9 +26,9 @@ from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.session import identified
 from biodance.pipeline.words import LOAD, cause_of, explained
-from biodance.records import Sip, Subject
+from biodance.records import Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 
 def as_diagnosed(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
@@ -182,15 +182,6 @@ def _suspects(effects: Chosen[Effect | DiscreteEffect], result: SessionResult) -
     return {name: one for name, one in family.items() if name != BodyMass.name} or family
 
 
-def _beside_guesses(known: Tolerances, subject: Subject, asked: Mapping[str, Cause]) -> Tolerances:
-    """Return the tolerances of a session whose ``subject`` may weigh anything where nobody said the mass, if that is
-    not what is ``asked``: what plates weighed that are under test themselves is no evidence against one of them.
-    """
-    if "mass" not in subject.guessed or BodyMass.name in asked:
-        return known
-    return replace(known, sizes={**known.sizes, key_of(BodyMass.name, ""): WRONG * subject.mass})
-
-
 def _judged(
     result: SessionResult,
     recorded: Recorded,
@@ -206,7 +197,7 @@ def _judged(
     checks = check_quality(recorded, chosen=asked)
     failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
     tell("observing feet on plates, clocks, weights")
-    known = _beside_guesses(tolerances or shipped(), result.session.subject, asked)
+    known = tolerances or shipped()
     evidence = collect_evidence(result.session, asked, known.norms)
     # what feet, clocks and weights measure on spoilt channels has no size
     if any(asked[quality.effect].raw for quality in failed if quality.effect in asked):
@@ -221,7 +212,7 @@ def _judged(
         why = " ".join(["No movement could be compared with a body.", result.placed.source, *dict.fromkeys(told)])
         bare = replace(bare, notes=(why, *bare.notes))
     else:
-        own = own_tolerances(result.body, fitted, result.session.trials, known=known)
+        own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
         try:
             seen = see(result.body, fitted, own.tolerances, asked, _prior(reference, result))
         except TrialRefused as why:

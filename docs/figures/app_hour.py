@@ -84,10 +84,14 @@ class Newcomer:
         self.pictures += 1
         self.browser.picture(PICTURES / f"app_{name}_{self.pictures}.png")
 
+    def tab(self, name: str, shown: str) -> None:
+        """Go to a tab, until what ``shown`` selects is on it."""
+        self.click(f"document.querySelector('#tab-{name}')")
+        self.browser.until(f"Boolean(document.querySelector({shown!r}))")
+
     def gait(self) -> None:
         """Go to the gait page."""
-        self.click("document.querySelector('#tab-gait')")
-        self.browser.until("document.querySelector('iframe')?.src.includes('part=gait')")
+        self.tab("gait", "iframe[src*='part=gait']")
 
 
 def roles(one: Newcomer) -> None:
@@ -106,8 +110,7 @@ def labels(one: Newcomer) -> None:
     """Run, exchange the labels that are named, run."""
     one.press("Run")
     one.ran()
-    one.click("document.querySelector('#tab-quality')")
-    one.browser.until("Boolean(document.querySelector('[data-key^=correct]'))")
+    one.tab("quality", "[data-key^=correct]")
     one.picture("labels")
     one.click("document.querySelector('[data-key=\"correct LKNE/RKNE\"]')")
     one.browser.until("Boolean(document.querySelector('[data-key=write]'))", 300)
@@ -124,11 +127,9 @@ def feet(one: Newcomer) -> None:
     """Run, and see what does not count."""
     one.press("Run")
     one.ran()
-    one.click("document.querySelector('#tab-quality')")
-    one.browser.until("Boolean(document.querySelector('.verdict'))")
+    one.tab("quality", ".verdict")
     one.picture("feet")
-    one.click("document.querySelector('#tab-steps')")
-    one.browser.until("Boolean(document.querySelector('#panel svg'))")
+    one.tab("steps", "#panel svg")
     one.picture("feet")
     one.gait()
     one.picture("feet")

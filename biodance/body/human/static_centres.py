@@ -40,9 +40,8 @@ class Centres:
     sole, the vertical without it; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts
     pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a movement placed; ``contradicted``
     the joints whose place here the movement contradicts, ``unshown`` those that a movement was asked for and does not
-    show. ``mid_hip`` (3,) m, where pelvis and trunk are taken to
-    begin, None for the middle of the hip centres: one hip alone that lies elsewhere does not move the matter of the
-    pelvis.
+    show. ``mid_hip`` (3,) m, where pelvis and trunk are taken to begin, None for the middle of the hip centres: one hip
+    alone that lies elsewhere does not move the matter of the pelvis.
     """
 
     place: _Places
