@@ -22,8 +22,7 @@ from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
-_DECLARED = 0.01
-"""Share of the mass by which careful declarations are wrong: clothes, shoes, another day."""
+_DECLARED = 0.01  # share of the mass by which careful declarations are wrong: clothes, shoes, another day
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
 _SHORTEST, _LONGEST = 0.2, 2.5
