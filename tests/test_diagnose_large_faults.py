@@ -12,6 +12,7 @@ from shared_markers import examined_beside
 from two_plates import changed, exchanged, foreign, late, session, weak
 
 from biodance.effects import Recorded
+from biodance.effects.dead_plate import DeadPlate
 from biodance.effects.frame_rate import FrameRate
 from biodance.effects.plate_gain import PlateGain
 from biodance.effects.plates_exchanged import PlatesExchanged
@@ -21,7 +22,7 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.session import examine
-from biodance.records import Wrench
+from biodance.records import Plate, Wrench
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
@@ -132,6 +133,38 @@ def test_a_plate_that_a_trial_lacks_stops_nothing(beside, monkeypatch):
     found = diagnosed(monkeypatch, lambda plates: (*plates, replace(far, wrench=quiet)), beside)
     assert names(found) == []
     assert found.diagnosis.status == "clean"
+
+
+def silent(*plates: str):
+    """Return a change: these plates read zero to the last bit."""
+
+    def change(them: tuple[Plate, ...]) -> tuple[Plate, ...]:
+        return tuple(
+            replace(p, wrench=Wrench(p.wrench.time, 0 * p.wrench.value)) if p.name in plates else p for p in them
+        )
+
+    return change
+
+
+def test_a_plate_that_reads_nothing_under_a_foot_is_dead(monkeypatch):
+    """Weight and movement are missing with it; without it the squats are feet beside the plates."""
+    found = diagnosed(monkeypatch, silent("plate1"))
+    assert names(found) == [("dead_plate", "plate1", ("static", "squat_1", "squat_2"))]
+
+
+@pytest.mark.parametrize(("plates", "trial"), [(("plate1", "plate2"), "static"), ((), "")])
+def test_a_trial_in_which_no_force_was_recorded_has_no_dead_plate(plates, trial, monkeypatch):
+    found = diagnosed(monkeypatch, silent(*plates), *[trial] * bool(trial))
+    assert "dead_plate" not in [one[0] for one in names(found)]
+
+
+def test_a_real_walk_over_a_plate_of_zeros_names_it_where_a_foot_stands(data: Path) -> None:
+    """Its other plate, too, reads zero to the last bit in the static trial: nobody stands on it there."""
+    visit = read_session(data / "biomechzoo/HC044A")
+    for plates, trials in (((), ()), (("plate1",), ("HC044A15", "HC044A29"))):
+        recorded = recorded_of(examine(changed(visit, silent(*plates))))
+        failed = [one for one in DeadPlate.check(recorded) if not one.ok]
+        assert [(one.target, one.trials) for one in failed] == [(name, trials) for name in plates]
 
 
 WALKS = [("biomechzoo/HC044A", "HC044A15"), ("c3d_parser_QCMAS", "QCMAS.dynamic"), ("c3d_parser_Sydney", "S4-AMGait04")]

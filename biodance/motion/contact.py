@@ -179,21 +179,22 @@ def _unmeasured_frames(
 
 def _of_foot(place: Footing, touching: Mask, foot: int) -> tuple[_Unmeasured, ...]:
     hidden, share, side = place.unseen[:, foot], place.share[:, foot], SIDES[foot]
-    apart = touching[:, foot] & ~place.covered[:, foot] & ~hidden
-    beside, partly = (
-        f"the {side} foot may touch the ground beside the plates",
-        f"the {side} foot may stand partly on a plate, partly beside it",
-    )
+    apart, off = touching[:, foot] & ~place.covered[:, foot] & ~hidden, f"the {side} foot may"
     return (
         _Unmeasured(LeftOut.FOOT_UNSEEN, f"the {side} foot was not seen", hidden),
-        _Unmeasured(LeftOut.FOOT_BESIDE, beside, apart & (share == 0)),
-        _Unmeasured(LeftOut.FOOT_BESIDE, partly, apart & (share > 0)),
+        _Unmeasured(LeftOut.FOOT_BESIDE, f"{off} touch the ground beside the plates", apart & (share == 0)),
+        _Unmeasured(LeftOut.FOOT_BESIDE, f"{off} stand partly on a plate, partly beside it", apart & (share > 0)),
     )
+
+
+def _unread(place: Footing, rests: Mask, load: Mask, index: int) -> Mask:
+    """Return (T, 2) where a foot rests on one plate alone, which reads no load."""
+    return place.on_plate[:, :, index] & (place.on_plate.sum(axis=2) == 1) & rests & ~load[:, index, None]
 
 
 def _of_plate(trial: Trial, place: Footing, rests: Mask, load: Mask, index: int) -> tuple[_Unmeasured, ...]:
     name, on, loaded = trial.plates[index].name, place.on_plate[:, :, index], load[:, index]
-    alone = on & (place.on_plate.sum(axis=2) == 1) & rests & ~loaded[:, None]
+    alone = _unread(place, rests, load, index)
     return (
         _Unmeasured(LeftOut.NO_FOOT_ON_PLATE, f"{name} is loaded but no foot is over it", loaded & ~on.any(axis=1)),
         *(
@@ -308,7 +309,8 @@ class Contact:
     ``cop_outside`` (T, P) m, distance of a plate's centre of pressure from the soles on it (0 = inside), NaN = hardly
     loaded; ``notes`` how many frames remain, and why no others; ``told`` (T, 2) True where the plates tell what the
     ground does to this foot, whatever the other one stands on; ``left_out`` the frames (T,) that are not measured, by
-    every reason that holds for them; ``seated`` (T,) True where the person sits on the plates (empty: nowhere).
+    every reason that holds for them; ``seated`` (T,) True where the person sits on the plates (empty: nowhere);
+    ``silent`` the plates that read no load under a resting foot, most of which is over them.
     """
 
     time: Array
@@ -320,6 +322,7 @@ class Contact:
     told: Mask
     left_out: Mapping[LeftOut, Mask] = field(default_factory=dict)
     seated: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    silent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,7 +414,14 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
         + _cop_notes(trial, outside, measured, feet.rules)
     )
     told = measured[:, None] | _told(trial, place, touching, feet.rests, borne)
-    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told, _by_reason(found), feet.seated)
+    silent = tuple(
+        plate.name
+        for index, plate in enumerate(trial.plates)
+        if (_unread(place, feet.rests, borne, index) & ((inside(plate, soles.outline) >= 0).mean(axis=2) > 0.5)).any()
+    )
+    return Contact(
+        soles.time, touching, place.on_plate, measured, outside, notes, told, _by_reason(found), feet.seated, silent
+    )
 
 
 def _seated_note(seated: Mask) -> tuple[str, ...]:

@@ -83,14 +83,18 @@ def cases_of(body: Body | None, found: tuple[TrialWindow, ...]) -> tuple[Case, .
 
 def recorded_of(result: SessionResult) -> Recorded:
     """Return what the checks look at in an examined session."""
-    return Recorded(result.session, cases_of(result.body, all_windows(result.trials)))
+    return _recorded(result, all_windows(result.trials))
 
 
 def failed_checks(result: SessionResult) -> tuple[QualityCheck, ...]:
     """Return the failed checks of the recordings; trials without plates are seen by their markers alone."""
     measured = tuple(window for window in all_windows(result.trials) if window.trial.plates)
-    checks = check_quality(Recorded(result.session, cases_of(result.body, measured)))
-    return tuple(quality for quality in checks if not quality.ok)
+    return tuple(quality for quality in check_quality(_recorded(result, measured)) if not quality.ok)
+
+
+def _recorded(result: SessionResult, seen: tuple[TrialWindow, ...]) -> Recorded:
+    contacts = {one.name: one.contact for one in result.trials if one.contact is not None}
+    return Recorded(result.session, cases_of(result.body, seen), contacts)
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:

@@ -5,13 +5,14 @@ fitted.
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, TypeVar, cast
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import About, CauseWords, CheckKind
+from biodance.motion.contact import Contact
 from biodance.motion.newton import LagAndMass, newton_of
 from biodance.records import Session, Subject, Trial
 
@@ -49,12 +50,13 @@ _Found = TypeVar("_Found")
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be
-    scaled).
+    """What the checks look at: the ``session`` as read, the tracked ``cases`` with measured frames (none where no body
+    could be scaled), and the ground ``contacts`` of all tracked trials by name.
     """
 
     session: Session
     cases: tuple[Case, ...] = ()
+    contacts: Mapping[str, Contact] = field(default_factory=dict)
 
     @cached_property
     def newton(self) -> Mapping[str, LagAndMass]:
