@@ -28,6 +28,9 @@ _QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0
 """Rotations about z by 90, 180 and 270 degrees."""
 
 _BESIDE = 0.15  # m beyond the edge
+_THROUGHOUT = 0.8
+"""Share of the loads that lie under the feet where the axes are right, edges of steps left aside."""
+_OVER_THE_EDGE = 0.05  # m beyond the edge: markers of a foot that stands on the plate
 _FRAMES = 200
 _UNDER_THE_FOOT, _NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
 _HANGING = 0.09
@@ -416,7 +419,7 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
         return reading, 0, near, ""
     # Other corner as the first: the axes turned by quarters about z.
     turns = {90 * k: replace(reading, axes=reading.axes @ turn) for k, turn in enumerate(_QUARTER_TURNS, start=1)}
-    found = {angle: _distance(turned, time, markers) for angle, turned in turns.items()}
+    found = {angle: _distance(turned, time, markers, throughout=True) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= _UNDER_THE_FOOT]
     if len(good) == 1 and all(d is None or d > _NOT_UNDER for angle, d in found.items() if angle != good[0]):
         said = (
@@ -428,8 +431,11 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
     return reading, 0, f"{said}.", f"{said}: check CORNERS, ORIGIN and whether a foot without markers stood there."
 
 
-def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | None:
-    """Return the median distance (m) of load and feet; None if no foot is seen on the plate."""
+def _distance(reading: PlateReading, time: Array, markers: Markers, *, throughout: bool = False) -> float | None:
+    """Return the median distance (m) of load and feet; None if no foot is seen on the plate. Where it has to lie under
+    one ``throughout``, the one that `_THROUGHOUT` of all loads have at most, and those without a foot on the plate are
+    infinitely far: forces that are late, or of another plate, can lie under a foot for a while, with any axes.
+    """
     if not markers.time.size:
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
@@ -439,6 +445,9 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
     cop, xyz = centre[:2] + point @ reading.axes[:2, :2].T, markers.xyz[frames]
     low = np.abs(xyz[:, :, 2] - centre[2]) <= FOOT_HEIGHT
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
+    if throughout:
+        # Rows are vectors: v @ axes is axes'v, in the plate's axes.
+        near &= (np.abs(((xyz - centre) @ reading.axes)[..., :2]) <= reading.half + _OVER_THE_EDGE).all(axis=2)
     seen = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
     if seen.sum() < max(1, min(5, len(cop))):
         return None
@@ -456,4 +465,7 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
         share = np.clip(-(x * ax + y * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
         square = (x + share * ax) ** 2 + (y + share * ay) ** 2
     # of each frame the nearest segment between two markers; inf without any
-    return float(np.median(np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))))
+    nearest = np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))
+    without = int(np.isfinite(cop).all(axis=1).sum() - seen.sum()) if throughout else 0
+    every = np.append(nearest, np.full(without, np.inf))
+    return float(np.quantile(every, _THROUGHOUT if throughout else 0.5, method="higher"))
