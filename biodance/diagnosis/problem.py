@@ -269,7 +269,7 @@ def _kinematic_rows(
     names: tuple[tuple[str, str], ...] = ()
     markers, frames = np.zeros(()), 0
     for index, pick, one in errors:
-        bands = where.layout.bands.at(where.rates[index])
+        bands = where.bands(index)
         kept = bands.of(pick.size) >= 0
         rows = bands.coefficients(where.layout.shift @ one.wrench)[kept]
         wrench.append(rows.reshape(-1, rows.shape[2]).astype(np.float32))

@@ -2,7 +2,8 @@
 bands only.
 
 A stationary error is nearly independent between coefficients; within a band its six channels share a covariance.
-Recordings are low-passed at 10 Hz; what lies above the last of `BANDS` is not looked at.
+What lies above the last of `BANDS`, or above the cut-off at which a trial was low-passed, is not looked at: nothing is
+left there of anything, and it would say that the band is quiet in trials that have it.
 """
 
 from collections.abc import Iterable
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 
 from biodance.effects import Case
 from biodance.errors import TrialRefused
+from biodance.lab.prepare import force_filter, motion_filter
 from biodance.records import Array, Markers, Motion, Wrench
-from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
@@ -29,15 +31,21 @@ class Spectrum:
     """Where the rows of a session come from.
 
     ``layout`` bands and the point (3,) m about which moments are taken; ``picks`` per trial the runs of frames
-    (indices); ``rates`` Hz per trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs together.
+    (indices); ``rates`` and ``cutoffs`` Hz per trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs
+    together.
     """
 
     layout: Noise
     picks: tuple[tuple[NDArray[np.intp], ...], ...]
     rates: tuple[float, ...]
+    cutoffs: tuple[float, ...]
     band: NDArray[np.intp]
     trial: NDArray[np.intp]
     seconds: float
+
+    def bands(self, index: int) -> Bands:
+        """Return the bands of one trial, as far as its low-pass leaves them."""
+        return _bands(self.rates[index], self.cutoffs[index])
 
     def rows(self, samples: Iterable[Array]) -> Array:
         """Return the coefficients (m, 6, n) of per-trial ``samples`` (T, 6, n) of wrenches about the lab origin, taken
@@ -53,7 +61,7 @@ class Spectrum:
 
     def of_trial(self, index: int, samples: Array) -> Array:
         """Return the coefficients (m_i, 6, n) of one trial's ``samples`` (T, 6, n)."""
-        bands = self.layout.bands.at(self.rates[index])
+        bands = self.bands(index)
         parts = []
         for pick in self.picks[index]:
             kept = bands.of(pick.size) >= 0
@@ -85,8 +93,11 @@ def spectrum(
     """
     picks, band, trial, seconds = [], [], [], 0.0
     rates = tuple(case.motion.rate for case in cases)
-    for index, (rate, use) in enumerate(zip(rates, uses, strict=True)):
-        there = BANDS.at(rate)
+    cutoffs = tuple(
+        min(motion_filter(one).cutoff, force_filter(one).cutoff) for one in (case.trial.settings for case in cases)
+    )
+    for index, (rate, cutoff, use) in enumerate(zip(rates, cutoffs, uses, strict=True)):
+        there = _bands(rate, cutoff)
         runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= shortest * there.rate)
         picks.append(runs)
         for pick in runs:
@@ -99,7 +110,12 @@ def spectrum(
         raise TrialRefused(
             f"No trial of {names} has {shortest:g} s of fully measured ground contact, so there is nothing to diagnose."
         )
-    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
+    where = np.concatenate(band), np.concatenate(trial)
+    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, cutoffs, *where, seconds)
+
+
+def _bands(rate: float, cutoff: float) -> Bands:
+    return BANDS.at(rate).below(cutoff)
 
 
 def thinned(case: Case, use: NDArray[np.bool_]) -> tuple[Case, NDArray[np.bool_]]:

@@ -68,7 +68,7 @@ def _second(problem: Problem, left: Array, row: Adequacy) -> float:
     spectrum = problem.spectrum
     index = [case.trial.name for case in problem.cases].index(row.trial)
     own = left[spectrum.trial == index, CHANNELS.index(row.channel)]
-    bands, time = spectrum.layout.bands.at(spectrum.rates[index]), problem.cases[index].motion.time
+    bands, time = spectrum.bands(index), problem.cases[index].motion.time
     best, second, start = -1.0, float("nan"), 0
     for pick in spectrum.picks[index]:
         band = bands.of(pick.size)

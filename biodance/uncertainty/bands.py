@@ -50,6 +50,12 @@ class Bands:
         """
         return self if np.isinf(self.rate) else replace(self, rate=rate / self.stride(rate))
 
+    def below(self, highest: float) -> "Bands":
+        """Return the same bands as far as ``highest`` Hz: what a low-pass has taken out does not count."""
+        if self.white or highest >= self.edges[-1]:
+            return self
+        return replace(self, edges=(*(edge for edge in self.edges if edge < highest), highest))
+
     def of(self, count: int) -> NDArray[np.intp]:
         """Return the band (count,) of every coefficient of a run of ``count`` samples; -1 for those that do not
         count.
