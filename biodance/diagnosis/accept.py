@@ -2,7 +2,7 @@
 gains elsewhere.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import BLOCK_SECONDS, FEWEST_BLOCKS, block_interval, removed_share
+from biodance.lab.prepare import highest_frequency
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
@@ -41,25 +42,28 @@ def _without_course(case: Case, one: NamedCause) -> Case:
 
 def case_fit(case: Case, use: NDArray[np.bool_]) -> Fit:
     """Return a case as a trial to identify from."""
-    return Fit(case.trial.name, case.motion, case.trial.wrench, use)
+    return Fit(case.trial.name, case.motion, case.trial.wrench, use, cutoff=highest_frequency(case.trial.settings))
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
     """What a body leaves of trials: per trial ``left`` (T, 6) N, N·m about the standing point, frames ``use`` (T,),
-    ``rate`` Hz.
+    ``rate`` and ``cutoff`` Hz of their low-pass.
     """
 
     names: tuple[str, ...]
     left: tuple[Array, ...]
     use: tuple[NDArray[np.bool_], ...]
     rate: tuple[float, ...]
+    cutoff: tuple[float, ...]
 
 
 def residuals_of(body: Body, fits: tuple[Fit, ...], about: Array) -> Residuals:
     """Return measured minus predicted wrench of ``body`` in every trial, about ``about`` (3,) m."""
     left = tuple(wrench_about_point(fit.wrench.value - predict_wrench(body, fit.motion).value, about) for fit in fits)
-    return Residuals(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
+    rows = ((f.name, f.use, f.motion.rate, f.cutoff) for f in fits)
+    names, use, rate, cutoff = zip(*rows, strict=True) if fits else ((), (), (), ())
+    return Residuals(names, left, use, rate, cutoff)
 
 
 def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residuals, Residuals]) -> Gain:
@@ -115,12 +119,12 @@ def _density_gain(before: Residuals, after: Residuals, fitted: tuple[Residuals, 
 
 def part(found: Residuals, trials: list[int]) -> Residuals:
     """Return some of the trials, by their index."""
-    return Residuals(*(tuple(getattr(found, name)[k] for k in trials) for name in ("names", "left", "use", "rate")))
+    return Residuals(*(tuple(getattr(found, one.name)[k] for k in trials) for one in fields(Residuals)))
 
 
 def join_residuals(first: Residuals, second: Residuals) -> Residuals:
     """Return the trials of both."""
-    return Residuals(*(getattr(first, name) + getattr(second, name) for name in ("names", "left", "use", "rate")))
+    return Residuals(*(getattr(first, one.name) + getattr(second, one.name) for one in fields(Residuals)))
 
 
 def _aligned(before: Residuals, after: Residuals) -> list[tuple[Array, Array, NDArray[np.bool_], float]]:
@@ -144,8 +148,8 @@ def _blocks(left: Array, use: NDArray[np.bool_], rate: float) -> Array:
 def _coefficients(found: Residuals) -> tuple[Array, NDArray[np.intp]]:
     """Return the cosine coefficients (n, 6) of all residuals and their bands (n,)."""
     values, bands = [], []
-    for left, use, rate in zip(found.left, found.use, found.rate, strict=True):
-        there = BANDS.at(rate)
+    for left, use, rate, cutoff in zip(found.left, found.use, found.rate, found.cutoff, strict=True):
+        there = BANDS.at(rate).below(cutoff)
         for pick in BANDS.runs(use, rate):
             band = there.of(pick.size)
             values.append(there.coefficients(left[pick])[band >= 0])

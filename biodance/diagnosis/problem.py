@@ -21,6 +21,7 @@ from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
 from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
+from biodance.lab.prepare import highest_frequency
 from biodance.motion.dynamics import regressor_of
 from biodance.records import Array, Motion, Sip, Trial, Wrench, runs
 from biodance.uncertainty.caution import widened_prior
@@ -46,7 +47,8 @@ class TrialWindow:
     @property
     def fit(self) -> Fit:
         """The trial as identification takes it."""
-        return Fit(self.trial.name, self.motion, self.trial.wrench, self.use)
+        cutoff = highest_frequency(self.trial.settings)
+        return Fit(self.trial.name, self.motion, self.trial.wrench, self.use, cutoff=cutoff)
 
     @property
     def runs(self) -> tuple[float, ...]:

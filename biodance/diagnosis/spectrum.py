@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.effects import Case
 from biodance.errors import TrialRefused
-from biodance.lab.prepare import force_filter, motion_filter
+from biodance.lab.prepare import highest_frequency
 from biodance.records import Array, Markers, Motion, Wrench
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.noise import Noise
@@ -93,9 +93,7 @@ def spectrum(
     """
     picks, band, trial, seconds = [], [], [], 0.0
     rates = tuple(case.motion.rate for case in cases)
-    cutoffs = tuple(
-        min(motion_filter(one).cutoff, force_filter(one).cutoff) for one in (case.trial.settings for case in cases)
-    )
+    cutoffs = tuple(highest_frequency(case.trial.settings) for case in cases)
     for index, (rate, cutoff, use) in enumerate(zip(rates, cutoffs, uses, strict=True)):
         there = _bands(rate, cutoff)
         runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= shortest * there.rate)

@@ -31,9 +31,10 @@ that only the slowest bands count.
 @dataclass(frozen=True, eq=False)
 class Fit:
     """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True
-    where both hold; ``outlier`` the share of the load by which a frame may differ from the table's prediction
-    (`Settings.outlier`, `believable`); ``doubts`` (T, 6, n) N, N·m about the lab origin: what one standard deviation
-    of each of n corrections makes of the wrench, the same n in all trials of a session.
+    where both hold; ``cutoff`` Hz of their low-pass, above which nothing is left of either; ``outlier`` the share of
+    the load by which a frame may differ from the table's prediction (`Settings.outlier`, `believable`); ``doubts`` (T,
+    6, n) N, N·m about the lab origin: what one standard deviation of each of n corrections makes of the wrench, the
+    same n in all trials of a session.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Fit:
     use: NDArray[np.bool_]
     outlier: float = Settings.outlier
     doubts: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
+    cutoff: float = np.inf
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
@@ -81,12 +83,12 @@ class Statistics:
             )
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
-    def add(self, rows: Array, rate: float, bands: int | None = None) -> None:
-        """Add the second moments of ``rows`` (T, 6, p + 1) of [W y] at ``rate`` Hz in the first ``bands``, by default
-        all, to the arrays.
+    def add(self, rows: Array, rate: float, cutoff: float = np.inf, bands: int | None = None) -> None:
+        """Add the second moments of ``rows`` (T, 6, p + 1) of [W y] at ``rate`` Hz, low-passed at ``cutoff`` Hz, in the
+        first ``bands``, by default all, to the arrays.
         """
         X, size = self.layout.bands.coefficients(self.layout.shift @ rows), self.gram.shape[-1]
-        band = self.layout.bands.at(rate).of(len(X))
+        band = self.layout.bands.at(rate).below(cutoff).of(len(X))
         for b in np.unique(band[(band >= 0) & (band < (len(self.gram) if bands is None else bands))]):
             flat = X[band == b].reshape(-1, 6 * size)
             # (6, s, 6, s) to [channel, channel, s, s]; only one of each pair is kept.
@@ -172,7 +174,7 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
         rows = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
         rows = np.concatenate([rows, fit.wrench.value[pick][:, :, None]], axis=2)
         still = _is_standing(moved.position) and not total.layout.bands.white
-        total.add(rows, fit.motion.rate, POSTURE_BANDS if still else None)
+        total.add(rows, fit.motion.rate, fit.cutoff, POSTURE_BANDS if still else None)
 
 
 def _is_standing(position: Array) -> bool:

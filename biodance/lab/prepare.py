@@ -76,6 +76,11 @@ def force_filter(settings: Settings) -> LowPass:
     return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
 
+def highest_frequency(settings: Settings) -> float:
+    """Return the Hz above which the low-pass of the movement or of the forces leaves nothing to compare."""
+    return min(motion_filter(settings).cutoff, force_filter(settings).cutoff)
+
+
 @lru_cache(maxsize=32)
 def _design_low_pass(settings: LowPass, rate: float) -> Array:
     """Return the second-order sections (S, 6) of one of the two passes at the sampling ``rate`` in Hz."""

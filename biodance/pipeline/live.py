@@ -30,7 +30,7 @@ from biodance.identification.knowledge import Knowability
 from biodance.identification.recursive import RecursivePosterior, initial_posterior, summed_pressure
 from biodance.identification.statistics import Fit, believable
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.prepare import at_marker_times, force_filter, motion_filter
+from biodance.lab.prepare import at_marker_times, force_filter, highest_frequency, motion_filter
 from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
 from biodance.motion.contact import Contact, contact_with_plates, feet_on_ground
@@ -267,7 +267,8 @@ class LiveSession:
         )
         motion = Motion(time, q, v, a, residual, self._follower.names, joint_names=parts[0].joint_names)
         wrench = Wrench(time, np.concatenate([fit.wrench.value for fit in self._taken]))
-        return Fit("stream", motion, wrench, np.concatenate([fit.use for fit in self._taken]), self._taken[0].outlier)
+        use, settings = np.concatenate([fit.use for fit in self._taken]), self.trial.settings
+        return Fit("stream", motion, wrench, use, settings.outlier, cutoff=highest_frequency(settings))
 
 
 _EMPTY = 0.3

@@ -17,6 +17,7 @@ from biodance.errors import TrialRefused
 from biodance.identification.statistics import Fit
 from biodance.lab.markers.signals import MarkerGaps
 from biodance.lab.plates.faults import PlateCorrection, correction_doubts
+from biodance.lab.prepare import highest_frequency
 from biodance.motion.contact import Contact
 from biodance.motion.newton import QuietStanding
 from biodance.records import CHANNEL_TITLES, Array, LeftOut, Motion, Trial, Wrench
@@ -284,5 +285,5 @@ def trial_fit(result: TrialResult, corrections: tuple[PlateCorrection, ...] = ()
     if found is None or result.motion is None or not found.used.any():
         return None
     doubts = {"doubts": correction_doubts(trial, corrections)} if corrections else {}
-    measured = Wrench(found.time, found.measured)
-    return Fit(trial.name, result.motion, measured, found.used, trial.settings.outlier, **doubts)
+    measured, cutoff = Wrench(found.time, found.measured), highest_frequency(trial.settings)
+    return Fit(trial.name, result.motion, measured, found.used, trial.settings.outlier, cutoff=cutoff, **doubts)
