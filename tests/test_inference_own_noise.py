@@ -43,10 +43,8 @@ def shown(found: DrawnRows) -> np.ndarray:
     """Return (Q,) the standard deviation of every whitened row under the session's own noise."""
     white = np.linalg.inv(np.linalg.cholesky(EXPECTED))
     own = white @ own_noise(found).noise @ white.T
-    size = np.sqrt(np.einsum("bcc->bc", own))
-    apart = own / (size[:, :, None] * size[:, None, :]) - np.eye(6)
-    assert np.abs(apart).max() < 0.8  # drawn one by one: what few rows have in common by chance
-    return size.ravel()
+    np.testing.assert_allclose(own, own * np.eye(6), atol=1e-12)
+    return np.sqrt(np.einsum("bcc->bc", own)).ravel()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -68,25 +66,9 @@ def test_few_rows_say_little_and_none_nothing() -> None:
     few, many = (np.median(shown(drawn(quiet, each=each))) for each in (2, 40))
     assert few > 1.15 * many
     some = drawn(np.full(BLOCKS, 0.6), each=40)
-    gone = np.isin(some.block, np.arange(6, 12))  # no coefficient of the second band
+    gone = np.isin(some.block, [4, 9])
     kept = replace(some, X=some.X[~gone], y=some.y[~gone], block=some.block[~gone])
-    np.testing.assert_allclose(shown(kept)[6:12], 1.0)
-
-
-@pytest.mark.parametrize(("each", "least", "most"), [(3, 0.05, 0.45), (60, 0.6, 0.85)])
-def test_channels_go_together_as_what_is_left_of_them(each: int, least: float, most: float) -> None:
-    """A force Fx that pushes at a height moves My with it, in every band; a few rows say little of it."""
-    some = drawn(np.full(BLOCKS, 0.7), each=each, seed=8)
-    y, force, moment = np.array(some.y), some.block % 6 == 0, some.block % 6 == 4
-    force[some.plates :] = moment[some.plates :] = False
-    # Both have the size 0.7 and the correlation 0.8.
-    y[moment] = 0.8 * y[force] + 0.6 * y[moment]
-    white = np.linalg.inv(np.linalg.cholesky(EXPECTED))
-    own = white @ own_noise(replace(some, X=0 * some.X, y=y)).noise @ white.T
-    size = np.sqrt(np.einsum("bcc->bc", own))
-    together = own / (size[:, :, None] * size[:, None, :])
-    assert least < np.median(together[:, 0, 4]) < most
-    np.testing.assert_allclose(np.median(np.abs(together[:, 1, 2])), 0.0, atol=0.2)
+    np.testing.assert_allclose(shown(kept)[[4, 9]], 1.0)
 
 
 def test_a_fault_is_not_hidden_by_the_noise_that_it_makes() -> None:
