@@ -14,7 +14,7 @@ from walkers import WEIGHT, Stand, plate, walker
 
 from biodance.errors import SessionRefused
 from biodance.lab.inspect import inspect_paths
-from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.plates.read import as_told, read_plates
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session

@@ -12,7 +12,7 @@ import biodance
 from biodance.errors import FileRefused
 from biodance.lab.inspect import inspect_file
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.readers.table import Load, table_plates
 from biodance.lab.session.write import init_session

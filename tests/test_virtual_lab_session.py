@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from perfect_recordings import PERFECT_INSTRUMENTS
 
+from benchmarks.people import sip_in_frames
 from biodance import virtual_lab
 from biodance.errors import BiodanceError
 from biodance.lab.readers.c3d import read_c3d
@@ -17,11 +18,10 @@ from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.virtual_lab.instruments import TISSUES
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, make_person, of_parameters, place_inertia
+from biodance.virtual_lab.movement import Protocol, read_protocol
+from biodance.virtual_lab.person import AddedLoad, make_person, of_parameters, place_inertia
 from biodance.virtual_lab.person.skeleton import REALISTIC, small_rotation
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.truth import sip_in_frames
 from biodance.virtual_lab.visit import (
     CAMERAS,
     PLATES,

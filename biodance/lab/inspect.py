@@ -15,7 +15,7 @@ from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.markers.signals import report_gaps
 from biodance.lab.markers.upright import standing_mass
-from biodance.lab.plates.parameters import Told
+from biodance.lab.plates import Told
 from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below

@@ -17,7 +17,6 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.time_axis import of_postures
 from biodance.lab.prepare import USUAL_CUTOFF, LowPass, low_pass, motion_filter
-from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.motion.ik.inverse_kinematics import (
     FrameStatus,
     InverseKinematics,
@@ -25,7 +24,7 @@ from biodance.motion.ik.inverse_kinematics import (
     general_jacobian,
     solve_ik,
 )
-from biodance.motion.kinematics import neighbours, poses
+from biodance.motion.kinematics import Balls, Chart, Smooth, chart_of, continued, neighbours, poses
 from biodance.records import AngleState, Array, Markers, Motion, Trial
 from biodance.records.arrays import rate_of
 from biodance.records.attention import Doubt

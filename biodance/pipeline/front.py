@@ -31,9 +31,9 @@ from biodance.pipeline.session import by_paper, followed, identification_of, ide
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Motion, Session, Trial
+from biodance.registration import Limits, Registration, concluded, rival_delays
 from biodance.registration.alignment import Alignment, Forces, alignments, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
-from biodance.registration.registration import Limits, Registration, concluded, rival_delays
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 

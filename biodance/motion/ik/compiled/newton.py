@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.ik.chart import balls
 from biodance.motion.ik.compiled import compiled
 from biodance.motion.ik.compiled.ball_step import exponential, product, turned
-from biodance.motion.kinematics import joint_arrays
+from biodance.motion.kinematics import balls, joint_arrays
 from biodance.records import Array
 
 # All that the gradient and the second derivatives by a joint need are four sums over the markers that move with it,
