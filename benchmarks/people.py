@@ -29,8 +29,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Motion, Sip, Subject
-from biodance.virtual_lab.person import of_parameters, parameters_of_inertia, place_inertia
-from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.simulate import simulate_session, sip_in_frames
 
 LABS = ("own", "foreign", "third")
 ROOM = ("--noise", "0.6", "--camera", "0.3")
@@ -43,28 +42,6 @@ PARTS = {"pelvis": ("pelvis",), "trunk_head": ("trunk", "thorax", "head")} | {
 DRAWS = 20_000
 """People drawn for the chance of being better than the table."""
 Row = dict[str, Any]
-
-
-def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array) -> Sip:
-    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that
-    model would find.
-
-    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's
-    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial. Joint
-    centres and axes differ between truth and model, so the numbers do; the body is the same.
-    """
-    phi = []
-    for segment, pose, turn, place in zip(
-        document["segments_12"], document["static_pose"]["segments_12"], rotation, position, strict=True
-    ):
-        own = np.array(
-            [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
-        )
-        # new_R_lab lab_R_own, and the own origin in the new frame.
-        there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
-        phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
-    flat = np.concatenate(phi)
-    return Sip(tuple(segment["name"] for segment in document["segments_12"]), flat, np.zeros((flat.size, flat.size)))
 
 
 def first_seed() -> int:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from perfect_recordings import PERFECT_INSTRUMENTS
 
-from benchmarks.people import sip_in_frames
 from biodance import virtual_lab
 from biodance.errors import BiodanceError
 from biodance.lab.readers.c3d import read_c3d
@@ -21,7 +20,7 @@ from biodance.virtual_lab.instruments import TISSUES
 from biodance.virtual_lab.movement import Protocol, read_protocol
 from biodance.virtual_lab.person import AddedLoad, make_person, of_parameters, place_inertia
 from biodance.virtual_lab.person.skeleton import REALISTIC, small_rotation
-from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.simulate import simulate_session, sip_in_frames
 from biodance.virtual_lab.visit import (
     CAMERAS,
     PLATES,

@@ -226,6 +226,8 @@ class Balls:
 
 
 _SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
+_ROUNDED = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
+_NO_LIMIT = np.array([[-np.inf]])
 
 
 def balls(body: Body) -> Balls:
@@ -258,8 +260,10 @@ def _unit(quaternion: Array) -> Array:
     return np.moveaxis(unit_quaternion(np.moveaxis(quaternion, 0, -1)), -1, 0)
 
 
-def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
-    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B)."""
+def _ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
+    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B); of both sets the one less outside the
+    limits (3, G, B or 1), if alike the one closer to ``near``.
+    """
     x, y, z, w = quaternion
     # Cardan angles x, y, z of R = R1 R2 R3: sin of the second is R[0, 2] = 2 (x z + y w).
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
@@ -270,11 +274,15 @@ def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
             np.arctan2(2 * (z * w - x * y), 1 - 2 * (y * y + z * z)),
         ]
     )
-    first = _turned_near(sign * one, near)
+    with np.errstate(invalid="ignore"):  # of joints without limits
+        middle = np.where(upper - lower < 2 * np.pi, (lower + upper) / 2, near)
     # (pi + a, pi - b, pi + c) is the same rotation.
-    other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), near)
-    away, other_away = (np.abs(angles - near).sum(axis=0) for angles in (first, other))
-    return np.where(other_away < away, other, first)
+    other = np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one
+    both = [_turned_near(sign * angles, middle) for angles in (one, other)]
+    more = [np.maximum(np.maximum(lower - angles, angles - upper), 0.0).sum(axis=0) for angles in both]
+    away = [np.abs(angles - near).sum(axis=0) for angles in both]
+    better = (more[1] < more[0] - _ROUNDED) | ((more[1] < more[0] + _ROUNDED) & (away[1] < away[0]))
+    return np.where(better, both[1], both[0])
 
 
 def _turned_near(angles: Array, middle: Array) -> Array:
@@ -338,11 +346,14 @@ class Chart:
         ball = stacked[root[1] : root[1] + count].reshape(4, count // 4, stacked.shape[1])
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
-    def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); of equal sets of Cardan angles the one closer to ``near`` (n, B) rad is taken."""
+    def posture(self, smooth: Smooth, near: Array, lower: Array = _NO_LIMIT, upper: Array = -_NO_LIMIT) -> Array:
+        """Return q (nq, B); of equal sets of Cardan angles the one less outside the limits (n, 1), if alike the one
+        closer to ``near`` (n, B) rad is taken.
+        """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
+        limits = (self.joints.angles_of(np.broadcast_to(one, (len(near), 1))) for one in (lower, upper))
+        ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near), *limits)
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles

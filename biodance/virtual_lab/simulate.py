@@ -16,7 +16,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.session.results_folder import whole_folder
-from biodance.records import Sip, Subject
+from biodance.records import Array, Sip, Subject
 from biodance.threads import one_thread
 from biodance.version import __version__
 from biodance.virtual_lab.causes import wobbling_mass
@@ -28,7 +28,10 @@ from biodance.virtual_lab.person import (
     Person,
     make_person,
     merged_sip,
+    of_parameters,
+    parameters_of_inertia,
     place_in_12,
+    place_inertia,
     true_frames,
     with_prostheses,
 )
@@ -268,3 +271,25 @@ def _load(person: Person, load: AddedLoad) -> dict[str, Any]:
         "place_on_carrier_m": load.place.tolist(),
         "radii_of_gyration_m": load.radii.tolist(),
     }
+
+
+def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array) -> Sip:
+    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that
+    model would find.
+
+    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's
+    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial. Joint
+    centres and axes differ between truth and model, so the numbers do; the body is the same.
+    """
+    phi = []
+    for segment, pose, turn, place in zip(
+        document["segments_12"], document["static_pose"]["segments_12"], rotation, position, strict=True
+    ):
+        own = np.array(
+            [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
+        )
+        # new_R_lab lab_R_own, and the own origin in the new frame.
+        there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
+        phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
+    flat = np.concatenate(phi)
+    return Sip(tuple(segment["name"] for segment in document["segments_12"]), flat, np.zeros((flat.size, flat.size)))

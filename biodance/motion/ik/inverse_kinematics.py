@@ -15,13 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.motion.ik.compiled import newton
-from biodance.motion.ik.compiled.ball_step import continue_angles, interpolate
+from biodance.motion.ik.compiled.ball_step import continue_angles
 from biodance.motion.ik.compiled.newton import MarkerChain, chain_of
 from biodance.motion.kinematics import Chart, chart_of, place_jacobian, poses
 from biodance.records import Array, Index, Markers, assign
@@ -103,8 +104,7 @@ def marker_distances(problem: MarkerProblem, q: Array) -> Array:
     return out
 
 
-_EQUAL = 1e-9
-"""Share by which the costs of one posture may differ: what the tolerance of the descent leaves."""
+_EQUAL = 1e-9  # Share by which the costs of one posture may differ: what the tolerance of the descent leaves
 
 
 def better(one: Minimum, other: Minimum) -> Minimum:
@@ -118,8 +118,7 @@ def better(one: Minimum, other: Minimum) -> Minimum:
     )
 
 
-_OTHERS = 0.01
-"""Weight of the other segments' markers in the root's rigid fit: enough where the root's own markers are hidden."""
+_OTHERS = 0.01  # Weight of other segments' markers in the root's rigid fit, for where its own are hidden
 
 
 def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
@@ -127,10 +126,9 @@ def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | Non
     lower, upper = problem.chain.lower, problem.chain.upper
     angles = np.clip(np.zeros(len(lower)), lower, upper)
     if share is not None:
-        bounded = np.isfinite(lower) & np.isfinite(upper)
-        angles = np.where(
-            bounded, (1 - share) * np.where(bounded, lower, 0) + share * np.where(bounded, upper, 0), angles
-        )
+        with np.errstate(invalid="ignore"):  # of joints without limits
+            within = (1 - share) * lower + share * upper
+        angles = np.where(np.isfinite(within), within, angles)
     return _place_root(problem, frames, np.tile(angles, (len(frames), 1)))
 
 
@@ -149,20 +147,14 @@ def _place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
 
 _STRIDES = (64, 16, 4, 1)
 """Every 64th frame is solved from its own markers; then every 16th, 4th and each frame from those around it."""
-
 SHARES = (0.5, None)
 """First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often
 than the reverse.
 """
-
 MORE_SHARES = (0.25, 0.75)
 """Further guesses for doubtful frames, and for all first frames of a short trial."""
-
-_SHORT = 640
-"""Frames below which a trial is short: it has too few neighbours to correct a frame that started wrongly."""
-
+_SHORT = 640  # Frames below which a trial has too few neighbours to correct a frame that started wrongly
 _NEIGHBOURS = 11  # Frames whose median fit a frame is compared with
-
 _DOUBT = (1.5, 0.001)
 """A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second
 (m).
@@ -229,17 +221,26 @@ def interpolate_postures(problem: MarkerProblem, known: Index, q: Array, wanted:
     """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known``
     (M,), increasing.
 
-    Monotone cubics in smooth coordinates; the first and the last posture are kept outside.
+    Monotone cubics in smooth coordinates (Fritsch & Butland 1984, DOI 10.1137/0905021), the ends kept outside.
     """
-    out = np.empty((len(wanted), q.shape[1]))
-    if wanted.size:
-        smooth = np.ascontiguousarray(problem.chart.smooth(q.T).stacked().T)
-        interpolate(problem.chain, known, smooth, q, problem.chart.single, wanted, out)
+    after = np.searchsorted(known, wanted, side="right")
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(known) - 1)
+    near = np.where(wanted - known[before] < known[after] - wanted, before, after)
+    out, inside = q[near], (wanted >= known[0]) & (wanted < known[-1])
+    if inside.any():
+        smooth = problem.chart.smooth(q.T).stacked()
+        # One more point straight on at either end: the slope there is that of the first and of the last piece.
+        time, values = (
+            np.concatenate([2 * one[..., :1] - one[..., 1:2], one, 2 * one[..., -1:] - one[..., -2:-1]], axis=-1)
+            for one in (known, smooth)
+        )
+        at = problem.chart.split(PchipInterpolator(time, values, axis=1)(wanted[inside]))
+        limits = problem.chain.lower[:, None], problem.chain.upper[:, None]
+        out[inside] = problem.chart.posture(at, out[inside, q.shape[1] - len(limits[0]) :].T, *limits).T
     return out
 
 
 _LEVER = 0.1  # m, what one radian is compared with: one metre of root translation counts as 10 rad
-
 _LEAST_MOTION = 0.02
 """Least share of its lever by which any unit change of posture must move the markers that it carries, for the
 posture to be determined.
