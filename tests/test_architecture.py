@@ -79,6 +79,10 @@ ONE_ALGORITHM = {
     "inference/rows.py": "all evidence of a session as the rows and columns of one linear model",
     "inference/sets.py": "the search over sets of causes: score, fit, widen, lessen, again beside an unknown",
     "lab/plates/sense.py": "the directions of a plate: every hypothesis is judged by the same load on the same plate",
+    "registration/__init__.py": "what is concluded of a pose, and the session that is written with it",
+    "lab/inspect.py": "what a recording and a session hold, for a person and as the first session.toml",
+    "motion/ik/compiled/legs.py": "the legs of a person in closed form, and any of six joints by Newton",
+    "body/tables/anthropometry.py": "tables with provenance, and among them those of segments, row by row",
     "registration/refinement.py": "a pose pulled by wrench and steps: rows, covariance, change, again from there",
     "report/figures/vector.py": "a light figure: axis, steps, marks, panel, curves; every mark is read by one script",
     "virtual_lab/recording_faults.py": "faults of a recording: three builders and what each of them makes",
@@ -120,7 +124,7 @@ CONTRACTS = {
 """Family -> the names that every member gives because its contract asks for them."""
 FAMILIES = {
     *CONTRACTS,
-    "biodance.body.tables.segment_data",
+    "biodance.body.tables.anthropometry",
     "biodance.lab.markers.sets",
     "biodance.report.pages.language",
 }
@@ -357,7 +361,7 @@ NAMED_ELSEWHERE = {
     "biodance.body.human.static_centres": "joint_centre, a row of the table of error sizes",
     "biodance.body.tables.choice": "trunk_joint, the body's optional joint",
     "biodance.motion.ik.joint_fit": "marker_misplaced, a row of the table of error sizes",
-    "biodance.body.tables.segment_data": "body_mass, a key of the tables of segments",
+    "biodance.body.tables.anthropometry": "body_mass, a key of the tables of segments",
     "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.tolerances": "joint_centre, a row of the table of error sizes",

@@ -9,7 +9,7 @@ from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import names
 from biodance.motion.dynamics import predict_wrench
-from biodance.motion.ik.legs import Leg, soft_limit
+from biodance.motion.ik.compiled.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.movement import read_protocol

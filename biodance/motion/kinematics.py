@@ -213,41 +213,9 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
     return PlacedJoints(joint_arrays(body)[3], rotation, origin, root, body.n_root)
 
 
-@dataclass(frozen=True, eq=False)
-class Balls:
-    """G ball joints: ``first`` (G,) index of each one's first joint, ``sign`` (G, 1) of their handedness."""
-
-    first: np.ndarray
-    sign: Array
-
-    def angles_of(self, angles: Array) -> Array:
-        """Return (3, G, B) rad from the angles of all joints (n, B)."""
-        return np.stack([angles[self.first + k] for k in range(3)])
-
-
 _SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
 _ROUNDED = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
 _NO_LIMIT = np.array([[-np.inf]])
-
-
-def balls(body: Body) -> Balls:
-    """Return the ball joints of ``body``."""
-    first, sign = [], []
-    parents = [joint.parent for joint in body.joints]
-    for i in range(len(body.joints) - 2):
-        one, two, three = body.joints[i : i + 3]
-        in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
-        if not (in_a_row and one.segment == two.segment == NO_SEGMENT):
-            continue
-        axes = np.array([joint.axis for joint in (one, two, three)])
-        # Meeting in one point, no rotation between, and square to each other: a ball joint.
-        turns = np.array([two.rotation, three.rotation, axes @ axes.T])
-        apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
-        if max(apart) < _SAME:
-            first.append(i)
-            # +1 or -1: axes of the left side are mirrored, and turn the other way about each.
-            sign.append(np.linalg.det(axes))
-    return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
 
 
 def continued(quaternion: Array) -> Array:
@@ -312,28 +280,26 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others."""
+    """Maps q to smooth coordinates and back: ``ball`` (3, G) the joints of the G ball joints, ``sign`` (G, 1) of their
+    handedness, ``single`` (m,) the other joints.
+    """
 
-    joints: Balls
+    ball: Index
+    sign: Array
     single: Index
     n_root: int
 
     @property
     def joint_count(self) -> int:
         """Number of joints n."""
-        return len(self.single) + 3 * len(self.joints.first)
-
-    @property
-    def nq(self) -> int:
-        """Number of position coordinates."""
-        return self.joint_count + (7 if self.n_root else 0)
+        return self.single.size + self.ball.size
 
     def smooth(self, q: Array) -> Smooth:
         """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames, signs and turns continued."""
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
         # Half angles; mirrored axes turn by the negative angle in their own, right-handed triad.
-        half = 0.5 * self.joints.sign * self.joints.angles_of(angles)
+        half = 0.5 * self.sign * angles[self.ball]
         (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
         c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
         # Product of the three quaternions about x, y, z, written out.
@@ -342,9 +308,9 @@ class Chart:
 
     def split(self, stacked: Array) -> Smooth:
         """Return the parts of ``stacked`` (3 + 4 + 4 G + m, B), as they are."""
-        root, count = (3, 7) if self.n_root else (0, 0), 4 * self.joints.first.size
-        ball = stacked[root[1] : root[1] + count].reshape(4, count // 4, stacked.shape[1])
-        return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
+        root, count = (3, 7) if self.n_root else (0, 0), self.ball.shape[1]
+        ball = stacked[root[1] : root[1] + 4 * count].reshape(4, count, stacked.shape[1])
+        return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + 4 * count :])
 
     def posture(self, smooth: Smooth, near: Array, lower: Array = _NO_LIMIT, upper: Array = -_NO_LIMIT) -> Array:
         """Return q (nq, B); of equal sets of Cardan angles the one less outside the limits (n, 1), if alike the one
@@ -352,16 +318,29 @@ class Chart:
         """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        limits = (self.joints.angles_of(np.broadcast_to(one, (len(near), 1))) for one in (lower, upper))
-        ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near), *limits)
-        for k in range(3):
-            angles[self.joints.first + k] = ball[k]
+        limits = (np.broadcast_to(one, (len(near), 1))[self.ball] for one in (lower, upper))
+        angles[self.ball] = _ball_angles(_unit(smooth.ball), self.sign, near[self.ball], *limits)
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles
 
 
 @lru_cache(maxsize=8)
 def chart_of(body: Body) -> Chart:
     """Return the chart of ``body``."""
-    joints = balls(body)
-    in_balls = np.concatenate([joints.first + k for k in range(3)])
-    return Chart(joints, np.setdiff1d(np.arange(len(body.joints)), in_balls), body.n_root)
+    first, sign = [], []
+    parents = [joint.parent for joint in body.joints]
+    for i in range(len(body.joints) - 2):
+        one, two, three = body.joints[i : i + 3]
+        in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
+        if not (in_a_row and one.segment == two.segment == NO_SEGMENT):
+            continue
+        axes = np.array([joint.axis for joint in (one, two, three)])
+        # Meeting in one point, no rotation between, and square to each other: a ball joint.
+        turns = np.array([two.rotation, three.rotation, axes @ axes.T])
+        apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
+        if max(apart) < _SAME:
+            first.append(i)
+            # +1 or -1: axes of the left side are mirrored, and turn the other way about each.
+            sign.append(np.linalg.det(axes))
+    ball = np.array(first, dtype=np.intp) + np.arange(3)[:, None]
+    single = np.setdiff1d(np.arange(len(body.joints)), ball)
+    return Chart(ball, np.round(np.array(sign).reshape(-1, 1)), single, body.n_root)

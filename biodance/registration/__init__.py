@@ -1,15 +1,26 @@
-"""The pose of every plate and the delay of their clock with intervals, or the reason why they cannot be told."""
+"""The pose of every plate and the delay of their clock with intervals, or the reason why they cannot be told; and
+markers and registered plates as an ordinary session, one C3D file with both.
+"""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import json
+import re
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from biodance import display
-from biodance.errors import TrialRefused
+from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.knowledge import SIGMAS
-from biodance.records import Array, Plate, freeze
+from biodance.lab.c3d.subject import as_written
+from biodance.lab.c3d.write import PlateRecording, plate_recording, write_c3d
+from biodance.lab.plates.decode import plate_axes
+from biodance.lab.session.file import FILES
+from biodance.lab.session.results_folder import whole_folder
+from biodance.records import Array, Markers, Plate, Session, Trial, Wrench, freeze
 from biodance.registration.alignment import Alignment, Forces, FramePose
 from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
 
@@ -290,3 +301,104 @@ def _placed(plate: Plate, loaded: bool, found: Refined) -> PlacedPlate:
     sd = np.array([*flat, HEIGHT_SD])
     yaw_sd = float(np.sqrt(found.covariance[2, 2]))
     return PlacedPlate(plate.name, centre, sd, float(np.arctan2(axis[1], axis[0])), yaw_sd, loaded)
+
+
+_MARK = "registration.json"
+"""Name of the file that says that a folder was written by `biodance register`."""
+_BESIDE = (".mp", ".vsk", ".enf", ".toml")  # What belongs to a session beside its recordings
+
+
+def registered_folder(folder: Path, *, force: bool) -> Path:
+    """Return the folder for a registered session, which is missing, empty, or with ``force`` an earlier one; nothing is
+    made or removed yet.
+
+    Raises
+    ------
+    SessionRefused
+        It is a file, or holds files: others' always, those of an earlier registration without ``force``.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise SessionRefused(f"{folder}: is a file; a session needs a folder. Choose another name.")
+    files = sorted(folder.iterdir()) if folder.is_dir() else []
+    if files and not (folder / _MARK).is_file():
+        raise SessionRefused(
+            f"{folder}: holds files that biodance did not write ({files[0].name}). Choose another name."
+        )
+    if files and not force:
+        raise SessionRefused(f"{folder}: holds an earlier registration. Choose another name, or --force.")
+    return folder
+
+
+def write_registered(
+    folder: Path, session: Session, trial: Trial, plates: Sequence[Plate], *, said: Mapping[str, Any]
+) -> Path:
+    """Write ``trial`` (as read, any format) with ``plates`` in the room and on the markers' clock into ``folder``, the
+    static trials and the subject's files of its ``session`` beside it, and what was ``said`` of the plates as
+    `registration.json`; return the C3D file. An earlier registration in the folder is replaced.
+
+    Frames of markers that the plates do not cover are left out, as C3D holds no unknown force.
+
+    Raises
+    ------
+    SessionRefused
+        The two share no time.
+    """
+    assert trial.markers is not None
+    markers, recorded, rate = _common(trial.markers, plates)
+    path, first = folder / f"{trial.source.path.stem}.c3d", trial.source.first_frame
+    first += int(np.searchsorted(trial.markers.time, markers.time[0]))
+    typed = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
+    with whole_folder(folder, over=True) as part:
+        c3d = part / path.name
+        write_c3d(c3d, markers=markers, plates=recorded, analog_rate=rate, parameters=typed, first_frame=first)
+        _copy_beside(session, trial, part)
+        (part / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+        # What lies in the folder of an earlier registration and was not written by it.
+        inside = sorted(folder.iterdir()) if folder.is_dir() else []
+        for file in [
+            one for one in inside if one.is_dir() or not (one.suffix == ".c3d" or one.name in (*FILES, _MARK))
+        ]:
+            if not (part / file.name).exists():
+                shutil.copy2(file, part / file.name) if file.is_file() else shutil.copytree(file, part / file.name)
+    return path
+
+
+def _copy_beside(session: Session, trial: Trial, folder: Path) -> None:
+    """Copy the static trials and the subject's files of a session, without what they say of the plates."""
+    own = trial.source.path.parent
+    for static in session.of_role("static"):
+        if static.source.path != trial.source.path:
+            shutil.copyfile(static.source.path, folder / static.source.path.name)
+    for file in sorted(own.iterdir()):
+        if file.is_file() and file.suffix.lower() in _BESIDE:
+            shutil.copyfile(file, folder / file.name)
+    for name in FILES:
+        if (own.resolve().parent / name).is_file() and not (folder / name).exists():
+            shutil.copyfile(own.resolve().parent / name, folder / name)
+    # the tables [plates.NAME] of a copied file are about plates as they were before
+    for path in (folder / name for name in FILES if (folder / name).is_file()):
+        text = path.read_text(encoding="utf-8")
+        path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
+
+
+def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[PlateRecording], float]:
+    """Return the markers within the plates' time and what the plates record at a whole multiple of their rate."""
+    from scipy.interpolate import make_interp_spline
+
+    time = plates[0].wrench.time
+    many = max(1, round(plates[0].wrench.rate / markers.rate))
+    step = 1.0 / markers.rate
+    # A frame is kept where all its samples lie within what the plates recorded.
+    kept = np.flatnonzero((markers.time >= time[0]) & (markers.time + (many - 1) / many * step <= time[-1]))
+    if kept.size < 2:
+        raise SessionRefused("Markers and plates share no time, so there is nothing to write.")
+    seen = Markers(markers.names, markers.time[kept], markers.xyz[kept])
+    # Every frame and the samples between it and the next.
+    fine = (seen.time[:, None] + step / many * np.arange(many)).ravel()
+    recordings = []
+    for plate in plates:
+        value = make_interp_spline(time, plate.wrench.value, k=3)(fine)
+        down = plate_axes(plate.corners)[2, 2] < 0  # the order of corners that a plate of TYPE 2 has
+        corners = plate.corners if down else plate.corners[[1, 0, 3, 2]]
+        recordings.append(plate_recording(replace(plate, corners=corners, wrench=Wrench(fine, np.asarray(value)))))
+    return seen, recordings, many * markers.rate

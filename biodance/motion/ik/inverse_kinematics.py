@@ -165,7 +165,7 @@ def search(problem: MarkerProblem, frames: Index) -> Minimum:
     """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
     count = len(frames)
     out = Minimum(
-        np.zeros((count, problem.chart.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
+        np.zeros((count, problem.body.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
     )
     known = np.zeros(0, dtype=np.intp)
     for stride in _STRIDES:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from biodance.body.body import load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
-from biodance.motion.ik.legs import Leg
+from biodance.motion.ik.compiled.legs import Leg
 from biodance.records import SIDES, Array, Wrench
 from biodance.virtual_lab.movement import GAITS, STAND, Gait, TrialPlan
 from biodance.virtual_lab.movement.performance import MARGIN, Performance, motion_through
