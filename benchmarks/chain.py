@@ -32,8 +32,8 @@ from biodance.dance.problem.plan import read_plan
 from biodance.pipeline.dance import dancer
 from biodance.pipeline.front_dance import simulate_dance
 from biodance.records import Array
+from biodance.virtual_lab.movement import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.movement.performance import PERFORMERS
-from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 
 SECONDS = {"own": 136.0, "foreign": 140.0}

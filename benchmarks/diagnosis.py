@@ -35,7 +35,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array
 from biodance.virtual_lab.causes import hide, parse_cause
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import FIRST_VISIT, LabVisit, draw_laboratory, draw_visitor
 

@@ -34,8 +34,8 @@ from biodance.pipeline.judged_trials import windows
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Subject
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.movement.performance import PERFORMERS
-from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
 

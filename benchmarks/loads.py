@@ -25,7 +25,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial_result import trial_fit
 from biodance.virtual_lab.causes import hide, parse_cause
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
 

@@ -26,7 +26,7 @@ from biodance.identification.statistics import Fit
 from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion, Subject, Wrench
 from biodance.uncertainty.noise import Noise
-from biodance.virtual_lab.person.person import of_parameters, parameters_of_inertia, place_inertia
+from biodance.virtual_lab.person import of_parameters, parameters_of_inertia, place_inertia
 
 SUBJECTS = (Subject(52.0, 1.58, "F"), Subject(66.0, 1.71, "F"), Subject(78.0, 1.80, "M"), Subject(97.0, 1.88, "M"))
 SECONDS, RATE, NOISE = 60.0, 100.0, (5.0, 2.0)

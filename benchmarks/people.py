@@ -29,8 +29,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Motion, Sip, Subject
-from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.truth import sip_in_frames
+from biodance.virtual_lab.simulate import simulate_session, sip_in_frames
 
 LABS = ("own", "foreign", "third")
 ROOM = ("--noise", "0.6", "--camera", "0.3")

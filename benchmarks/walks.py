@@ -23,7 +23,7 @@ from inject import inject
 from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.plates.parameters import count_plates
+from biodance.lab.plates import count_plates
 from biodance.lab.session.read import read_session
 from biodance.observations import SeenTrial, observe, recording
 from biodance.pipeline.diagnosis import diagnose_session

@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from biodance.records import Subject as Subject
     from biodance.records import Trial as Trial
     from biodance.records import Wrench as Wrench
-    from biodance.registration.registration import Registration as Registration
+    from biodance.registration import Registration as Registration
     from biodance.settings import Settings as Settings
 
 HOMES = {
@@ -98,7 +98,7 @@ HOMES = {
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),
     "records": ("FootSizes", "Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
-    "registration.registration": ("Registration",),
+    "registration": ("Registration",),
     "settings": ("Settings",),
 }
 """Module -> the names of the front door that live there; each is loaded when it is first asked for."""

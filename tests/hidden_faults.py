@@ -14,7 +14,7 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array, Plate, Subject
 from biodance.virtual_lab.causes import hide, parse_cause
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
 

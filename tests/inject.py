@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError
+from biodance.lab.c3d import DEC, MIPS, floats, integers, read_header
 from biodance.lab.c3d.layout import Layout
-from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, read_raw
 from biodance.lab.c3d.write import PlateRecording
-from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters
+from biodance.lab.plates import PlateParameters, count_plates, plate_parameters
 from biodance.lab.plates.read import decode_plates
 from biodance.lab.plates.sense import gravity_sign, sensor_below, with_loads_on_plates
 from biodance.lab.readers.c3d import file_frame

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from biodance.cycles import TrialMovement
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import Cycle
-from biodance.cycles.movement import TrialMovement
 from biodance.cycles.scores import SCORE_ANGLES
 from biodance.cycles.strides import Stride
 from biodance.cycles.summary import Repetitions, repetitions_of

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from biodance.body.human.human import human
-from biodance.body.tables.anthropometry import COUNT, KINDS
+from biodance.body.tables.anthropometry import COUNT, KINDS, read_segment_table
 from biodance.body.tables.choice import reference
-from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 

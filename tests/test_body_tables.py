@@ -15,9 +15,8 @@ from biodance.body.parts import (
     rigid_inertia,
     smallest_eigenvalues,
 )
-from biodance.body.tables.anthropometry import COUNT, KINDS, read_table
+from biodance.body.tables.anthropometry import COUNT, KINDS, read_segment_table, read_table
 from biodance.body.tables.choice import PARTS, measured_whole, reference, regression, table_names
-from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml
 from biodance.records import Subject

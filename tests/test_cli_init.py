@@ -9,10 +9,9 @@ from standing_markers import OWN, stand
 
 from biodance.cli import run
 from biodance.errors import SessionRefused
-from biodance.lab.inspect import inspect_paths
+from biodance.lab.inspect import init_session, inspect_paths
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
-from biodance.lab.session.write import init_session
 
 
 def test_init_writes_its_guesses_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

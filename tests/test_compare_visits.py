@@ -15,9 +15,9 @@ from browser import Page
 from scipy.stats import t as student
 
 from biodance.cli import run
+from biodance.cycles import TrialMovement
 from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import PERCENT, Cycle
-from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import Stride
 from biodance.cycles.summary import key_values, leading_foot, stride_values
 from biodance.errors import SessionRefused
@@ -34,7 +34,7 @@ from biodance.pipeline.visits import (
 from biodance.records import Session, Subject
 from biodance.report.visits import comparison_sentence, write_visits
 from biodance.uncertainty.visits import KeyKind, beyond_chance, change_of_mean, placement_sd, visit_mean
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import write_visit
 from biodance.virtual_lab.visit import LabVisit, perform_in
 

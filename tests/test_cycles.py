@@ -9,9 +9,9 @@ from squatting import BODY as SQUATTER
 from squatting import squat
 
 from biodance.body.human.human import human
+from biodance.cycles import compare_angles, compare_events, trial_movement
 from biodance.cycles.curves import CycleCurve, angle_curves, group_curves, lab_curves, load_curves
 from biodance.cycles.cut import Cycle, agreement_of_events, gait_cycles, joined_events, kinematic_events, repetitions
-from biodance.cycles.movement import compare_angles, compare_events, trial_movement
 from biodance.cycles.scores import normal_curves, normal_of, normal_toml
 from biodance.cycles.strides import mean_values, strides, vertical_stiffness
 from biodance.lab.c3d.subject import FileOutputs

@@ -126,7 +126,7 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
     from biodance.uncertainty.caution import _turn_slope, shift_slope
-    from biodance.virtual_lab.person.person import of_parameters, parameters_of_inertia, place_inertia
+    from biodance.virtual_lab.person import of_parameters, parameters_of_inertia, place_inertia
 
     phi = np.array(person(6)[0].sip.phi[:10])
     J, step = of_parameters(phi), 1e-6

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from biodance.lab.c3d import raw as c3d
+from biodance.lab.c3d import read_header
 from biodance.lab.c3d.layout import read_layout
-from biodance.lab.c3d.parameters import read_header
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.readers.c3d import read_c3d
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from biodance.cycles import emg_curves
 from biodance.cycles.cut import Cycle
-from biodance.cycles.movement import emg_curves
 from biodance.lab.c3d.subject import FileOutputs, emg_envelopes, muscle_of
 
 RATE = 1000.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plate_emulator import RATE, Emulated, channels, random_pose, raw_file, step, yaw
 
-from biodance.lab.plates.parameters import declared_plates
+from biodance.lab.plates import declared_plates
 from biodance.lab.plates.read import decode_plates, read_plates
 from biodance.lab.plates.sense import pressure_point
 from biodance.records import Markers

@@ -13,14 +13,14 @@ from plate_emulator import RATE, Emulated, channels, raw_file, step, yaw
 from walkers import WEIGHT, Stand, plate, walker
 
 from biodance.errors import SessionRefused
-from biodance.lab.inspect import inspect_paths
-from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.inspect import init_session, inspect_paths
+from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.plates.read import as_told, read_plates
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
-from biodance.lab.session.write import init_session, write_registered
 from biodance.motion.contact import ground_contact
 from biodance.records import Plate, Source, Trial, Wrench
+from biodance.registration import write_registered
 
 PAGE = Path(__file__).parents[1] / "docs" / "session_folder.md"
 LABELS = [f"AMTI_{number}.{name}" for number in (1, 2) for name in ("FX", "FY", "FZ", "MX", "MY", "MZ")]

@@ -10,12 +10,11 @@ from two_plates import CENTRES, HALF
 
 import biodance
 from biodance.errors import FileRefused
-from biodance.lab.inspect import inspect_file
+from biodance.lab.inspect import init_session, inspect_file
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.readers import read_trial, reader_of
 from biodance.lab.readers.table import Load, table_plates
-from biodance.lab.session.write import init_session
 
 EVEN = 0.2 + np.arange(100) / 60
 POINT = np.array([0.9, 0.47, 0.0])

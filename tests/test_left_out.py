@@ -13,7 +13,7 @@ from biodance.records import LeftOut
 from biodance.records.attention import Judged, seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
 from biodance.virtual_lab.causes import hide, parse_cause
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
 

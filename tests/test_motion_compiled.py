@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 from marker_trials import dance, points
 from random_bodies import random_body
-from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 import biodance.motion
 from biodance.body.human.human import human
 from biodance.motion.ik.compiled import ball_step, newton
-from biodance.motion.ik.compiled.ball_step import smooth_at
 from biodance.motion.ik.compiled.newton import (
     _LENGTH,
     add_up,
@@ -195,15 +193,6 @@ def test_a_ball_joint_stopped_by_a_limit_takes_the_nearest_rotation_within_it():
             met += 1
             assert (rotation_of(1.0, out) * wanted.inv()).magnitude() <= (every * wanted.inv()).magnitude().min() + 0.02
     assert met >= 10
-
-
-def test_the_cubic_between_frames_is_monotone_and_meets_them():
-    known, rng = np.array([0, 4, 8, 12, 13, 20]), np.random.default_rng(3)
-    values, out = rng.normal(size=(6, 3)), np.empty(3)
-    judge = PchipInterpolator(known, values)
-    for frame in range(4, 13):  # scipy treats the first and the last piece differently
-        smooth_at(known, values, np.searchsorted(known, frame, side="right") - 1, frame, out)
-        np.testing.assert_allclose(out, judge(frame), atol=1e-12)
 
 
 CHANGED = """

@@ -16,7 +16,7 @@ from biodance.body.parts import UPRIGHT
 from biodance.body.similarity import SimilarityScale, hoap3, similar_body, standing_frames
 from biodance.body.urdf import read_urdf
 from biodance.errors import BiodanceError
-from biodance.motion.ik.legs import GeneralLeg, Leg
+from biodance.motion.ik.compiled.legs import GeneralLeg, Leg
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Subject
 

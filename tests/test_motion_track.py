@@ -17,8 +17,8 @@ from biodance.motion.kinematics import poses
 from biodance.motion.track import track, upright_trunk
 from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
-from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.movement import read_protocol
+from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import Laboratory, LabVisit, perform_in, set_up
 

@@ -16,7 +16,7 @@ from biodance.motion.soles import soles_from_body
 from biodance.pipeline.export import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement import Protocol, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 
 

@@ -16,8 +16,8 @@ from biodance.cli import run
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.program_tables import write_mot
-from biodance.lab.session.write import write_registered
 from biodance.records import Markers, Plate, Subject, Wrench
+from biodance.registration import write_registered
 
 YAW, SHIFT, LATE = 2.0, (1.3, -2.1), 0.7345
 """rad, m, s: frame of the force file in the room; the force file's clock less the markers'."""

@@ -21,8 +21,7 @@ from biodance.identification.statistics import Fit
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.compiled.ball_step import continue_angles
 from biodance.motion.ik.compiled.newton import chain_of
-from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.search import Minimum, better
+from biodance.motion.ik.inverse_kinematics import Minimum, better, solve_ik
 from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Sip, Source, Subject, Trial, Wrench

@@ -20,7 +20,7 @@ from biodance.pipeline.diagnosis import diagnosed_and_corrected
 from biodance.pipeline.session import examine
 from biodance.records import Array, Markers, Trial, Wrench
 from biodance.spatial import wrench_about_point
-from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
+from biodance.virtual_lab.movement import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 
 HOLD, AROUND = 1.2, 0.3

@@ -26,7 +26,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.accepted import write_corrected
 from biodance.records import Motion
 from biodance.uncertainty.caution import widened_prior
-from biodance.virtual_lab.person.person import make_person, with_prostheses
+from biodance.virtual_lab.person import make_person, with_prostheses
 
 TRIALS = ("static", "move_1", "move_3", "move_5", "squat_1")
 LESS = 2.0

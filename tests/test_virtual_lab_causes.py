@@ -18,9 +18,9 @@ from biodance.lab.c3d.raw import read_raw
 from biodance.lab.readers import read_trial
 from biodance.records import Subject, Trial
 from biodance.virtual_lab.causes import CAUSES, Hidden, Spring, fault_of, hide, parse_cause, swing
+from biodance.virtual_lab.movement import Protocol, read_protocol
 from biodance.virtual_lab.movement.performance import perform
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
-from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Laboratory, LabVisit
 

@@ -26,7 +26,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.front_dance import simulate_dance, stretches
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.movement.performance import _JOINTS, PERFORMERS, Performer, copy_dance, true_wrench
-from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.person.skeleton import PERFECT
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)

@@ -20,9 +20,9 @@ from biodance.observations._recording import recording
 from biodance.pipeline.session import examine
 from biodance.records import Subject
 from biodance.virtual_lab.causes import fault_of, parse_cause
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.movement.gait import GaitPerformance, perform_gait
-from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.simulate import simulate_session
 
 G = 9.80665

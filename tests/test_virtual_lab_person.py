@@ -8,17 +8,20 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.instruments import reference_angles
-from biodance.virtual_lab.person.person import (
+from biodance.virtual_lab.person import (
+    MERGED,
     AddedLoad,
+    load_on,
     make_person,
+    merged_sip,
     of_parameters,
     parameters_of_inertia,
+    place_in_12,
     place_inertia,
+    reference_angles,
     true_pseudo_inertia,
 )
 from biodance.virtual_lab.person.skeleton import PERFECT, TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
-from biodance.virtual_lab.truth import MERGED, load_on, merged_sip, place_in_12
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]
 

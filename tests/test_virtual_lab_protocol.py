@@ -9,13 +9,13 @@ from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import names
 from biodance.motion.dynamics import predict_wrench
-from biodance.motion.ik.legs import Leg, soft_limit
+from biodance.motion.ik.compiled.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Subject
+from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.movement.performance import perform
 from biodance.virtual_lab.movement.posing import septic
-from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, make_person
+from biodance.virtual_lab.person import AddedLoad, make_person
 
 HEAD = """
 name = "mine"

@@ -17,11 +17,10 @@ from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.virtual_lab.instruments import TISSUES
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, make_person, of_parameters, place_inertia
+from biodance.virtual_lab.movement import Protocol, read_protocol
+from biodance.virtual_lab.person import AddedLoad, make_person, of_parameters, place_inertia
 from biodance.virtual_lab.person.skeleton import REALISTIC, small_rotation
-from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.truth import sip_in_frames
+from biodance.virtual_lab.simulate import simulate_session, sip_in_frames
 from biodance.virtual_lab.visit import (
     CAMERAS,
     PLATES,

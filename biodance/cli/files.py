@@ -83,7 +83,7 @@ def init_command(session: Path, *, subject: str | None = None, json: shared.Json
     subject
         Subject to read if a C3D file contains several.
     """
-    from biodance.lab.session.write import init_session
+    from biodance.lab.inspect import init_session
     from biodance.report.terminal import print_initialised
 
     found = init_session(session, subject_name=subject)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from biodance.body.tables.error_sizes import error_size
+from biodance.cycles import TrialMovement
 from biodance.cycles.curves import CurveGroup, CycleCurve, group_curves
 from biodance.cycles.cut import PERCENT, Cycle
-from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import LIFT_UNITS, STRIDE_UNITS, Stride, mean_values
 from biodance.lab.plates.faults import GAIN
 from biodance.records import SIDES, grouped

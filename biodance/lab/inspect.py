@@ -1,26 +1,32 @@
-"""Say what is in a recording: all that a person wants to know before trusting it, as plain values ready for JSON."""
+"""Say what is in a recording: all that a person wants to know before trusting it, as plain values ready for JSON; and
+what is in a session: ``biodance init`` writes what is declared into session.toml, and what was guessed as comments.
+"""
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.c3d.subject import subjects_in
 from biodance.lab.markers.guess import guess_set, said_of
+from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.markers.signals import report_gaps
 from biodance.lab.markers.upright import standing_mass
-from biodance.lab.plates.parameters import Told
+from biodance.lab.plain_text import write_whole
+from biodance.lab.plates import Told
 from biodance.lab.readers import read_trial, reader_of
+from biodance.lab.session.entries import plate_lines
 from biodance.lab.session.file import read_session_file
+from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.records import Plate, Trial
+from biodance.records import Plate, Session, Trial
 from biodance.settings import COP_FORCE
 
 _KEYS = (
@@ -175,3 +181,138 @@ def _plate(plate: Plate) -> dict[str, Any]:
 
 def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+_FILE = "session.toml"
+
+
+def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
+    """Read a session and write what is declared of it into its session.toml, and what was guessed as comments, to be
+    confirmed or corrected.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and no session.toml yet.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+
+    Returns
+    -------
+    dict
+        ``file`` that was written; ``subject`` {name, mass_kg, height_m, sex, age, guessed: [names]}; ``trials``
+        [{name, role, why}]; ``marker_set`` name, "guessed" or None; ``marker_map`` label -> landmark or segment where
+        it was guessed, else None; ``markers`` whether there are any; ``plates`` [{trial, name, type, decisions}];
+        ``refused`` file -> reason; ``notes``.
+
+    Raises
+    ------
+    SessionRefused
+        There is a session.toml already, or the session cannot be read.
+
+    Examples
+    --------
+    >>> from biodance.lab.inspect import init_session
+    >>> init_session("visit")
+    Traceback (most recent call last):
+    biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
+    """
+    target = Path(folder) / _FILE
+    if target.exists():
+        raise SessionRefused(
+            f"{target} is there already, and nothing of yours is overwritten. Correct it, or move it away and run this "
+            f"again."
+        )
+    session = read_session(folder, subject_name=subject_name)
+    found = _found(session, target)
+    lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
+    write_whole(target, ("\n".join(lines) + "\n").encode())
+    return found
+
+
+def _found(session: Session, target: Path) -> dict[str, Any]:
+    """Return what the file will say, as plain values."""
+    worn = next((trial.marker_set for trial in _statics_first(session) if trial.marker_set), "")
+    trials, plates = [], []
+    for trial in session.trials:
+        start = f"{trial.name} has the role {trial.role}: "
+        why = next((note.removeprefix(start).rstrip(".") for note in session.notes if note.startswith(start)), "")
+        trials.append({"name": trial.source.path.stem, "role": trial.role, "why": why})
+        for plate in trial.plates:
+            said = {"name": plate.name, "type": plate.type, "decisions": list(plate.decisions)}
+            plates.append({"trial": trial.name, **said})
+    who = session.subject
+    numbers = {"mass_kg": who.mass, "height_m": who.stature, "age": who.age}
+    known = {key: float(f"{value:.4g}") if math.isfinite(value) else None for key, value in numbers.items()}
+    return {
+        "file": str(target),
+        "subject": {"name": who.name, **known, "sex": who.sex, "guessed": list(who.guessed)},
+        "trials": trials,
+        "markers": any(trial.markers is not None for trial in session.trials),
+        "marker_set": worn.partition(" {")[0] or None,
+        "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
+        "plates": plates,
+        "refused": dict(session.refused),
+        "notes": list(session.notes),
+    }
+
+
+def _statics_first(session: Session) -> list[Trial]:
+    return sorted(session.trials, key=lambda trial: trial.role != "static")
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    """Yield the lines of the file; every guess and every doubt is a comment: what stands here is believed."""
+    yield "# Written by biodance init: what the recordings say. What was guessed has a # before it and says nothing:"
+    yield "# take the # away where it is right, or correct it."
+    for note in found["notes"]:
+        if " has the role " not in note and "the map was guessed" not in note:
+            yield f"# {note}"
+    for file, reason in found["refused"].items():
+        yield f"# {file} was refused: {reason}"
+    yield from ("", "[subject]")
+    subject = found["subject"]
+    guessed = {"mass_kg": "mass", "height_m": "stature", "sex": "sex"}
+    for key in ("mass_kg", "height_m", "sex", "age"):
+        value = subject[key]
+        if value is None:
+            yield f"# {key} =   not known"
+        elif guessed.get(key) in subject["guessed"]:
+            yield f"# {key} = {json.dumps(value)}  # guessed"
+        else:
+            yield f"{key} = {json.dumps(value)}"
+    yield '# prosthesis = "left_shank"  # the segment that a prosthesis begins with'
+    yield from ("", "# [devices]  kg worn beside mass_kg, by segment", "# right_shank = 0.6")
+    for trial in {trial["name"]: trial for trial in found["trials"]}.values():
+        yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'# role = "{trial["role"]}"  # {trial["why"]}')
+    yield from ("", *_marker_lines(found))
+    for plate in found["plates"]:
+        yield f"# {plate['trial']}: {plate['name']}, TYPE {plate['type']}. {' '.join(plate['decisions'])}".rstrip()
+
+
+def _begun_map(session: Session, found: dict[str, Any]) -> Iterator[str]:
+    """Yield, where no set could be guessed, a map to complete: what is certain, and the other labels."""
+    worn = [trial.markers for trial in _statics_first(session) if trial.markers is not None]
+    if found["marker_set"] or not worn:
+        return
+    begun = guess_set(worn[0]).map
+    yield "# A map to complete: write a landmark (left_asis) or a segment (left_thigh) behind every label; take away"
+    yield "# the lines of labels that mark nothing, and the # before the others."
+    yield "# [markers.map]"
+    for label in sorted(plain_labels(worn[0].names), key=lambda one: (begun.get(one, "~"), one)):
+        yield f"# {json.dumps(label)} = {json.dumps(begun.get(label, ''))}"
+
+
+def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
+    if found["marker_map"] is None:
+        worn = found["marker_set"]
+        yield '# [markers]  no marker set is known; file = "set.toml", or map = {...}' if not worn else "[markers]"
+        if worn:
+            yield f"# file = {json.dumps(worn)}  # recognised by its labels"
+    else:
+        yield "# Guessed from the names and from where the markers are on the standing person; a wrong map is worse"
+        yield "# than none: compare it with what you placed. Legal are landmarks (left_asis) and segments (left_thigh)."
+        yield "# [markers.map]"
+        for label, place in sorted(found["marker_map"].items(), key=lambda item: (item[1].split("_")[-2:], item[0])):
+            yield f"# {json.dumps(label)} = {json.dumps(place)}"
+    yield ""

@@ -12,16 +12,18 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import savgol_filter
 
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import distribute
-from biodance.motion.sitting import sitting
 from biodance.motion.soles import (
     Footing,
     Soles,
     Surfaces,
     cop_outside,
+    distance_to_hull,
     find_surfaces,
     footing,
     inside,
@@ -29,7 +31,39 @@ from biodance.motion.soles import (
     standing_on,
 )
 from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
-from biodance.settings import ContactRules
+from biodance.settings import COP_FORCE, ContactRules
+
+_BEARS = (0.9, 1.2)
+"""Shares of the weight between which the plates read, at the mean, while they carry all of it."""
+_BESIDE = 0.10
+"""m from both soles at which no foot carries the load: farther than a plate's place is wrong."""
+_HANGS = 0.04
+"""m over the plates: a sole of a scaled body that stands is nearer."""
+_LASTS = 1.0
+"""s of sitting, at least."""
+
+
+def sitting(trial: Trial, soles: Soles, *, weight: float) -> Mask:
+    """Return (T,) where the person sits on the plates: for a second and longer they carry the ``weight`` N (NaN =
+    unknown, then nowhere), both feet hang over them, and the load lies beside both.
+    """
+    found, total = np.zeros(soles.time.size, dtype=bool), trial.wrench
+    if not weight > 0 or soles.time.size < 2:
+        return found
+    height = max(plate.height for plate in trial.plates)
+    load = total.cop(height=height, threshold=max(COP_FORCE, weight / 2))[:, :2]
+    known = np.isfinite(load).all(axis=1) & np.isfinite(soles.outline).all(axis=(1, 2, 3))
+    outline = soles.outline[known][..., :2].reshape(int(known.sum()), 2 * soles.outline.shape[2], 2)
+    # Both soles together: who sits has the load beside the hull of both feet.
+    beside = np.zeros(found.size, dtype=bool)
+    beside[known] = distance_to_hull(load[known], outline) > _BESIDE
+    least = _LASTS / float(np.median(np.diff(soles.time)))
+    for start, stop in runs(beside):
+        hangs = np.median(soles.outline[start:stop, ..., 2].min(axis=2), axis=0) - height > _HANGS
+        share = float(np.mean(total.force[start:stop, 2])) / weight
+        found[start:stop] = stop - start >= least and hangs.all() and _BEARS[0] <= share <= _BEARS[1]
+    return found
+
 
 _SHORTEST_FLIGHT = 0.05  # s: in less the parabola of the markers cannot be seen
 _FALLS = 0.6
@@ -75,16 +109,15 @@ def _falls(trial: Trial, start: int, stop: int) -> bool:
     whole = np.isfinite(height).all(axis=0)
     if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4:
         return False
-    parts = [height[:, some].mean(axis=1) for some in (whole, whole & _on(trial, "pelvis")) if some.any()]
-    return any(_is_free_fall(time, mean, trial.settings.gravity) for mean in parts)
-
-
-def _is_free_fall(time: Array, height: Array, gravity: float) -> bool:
-    middle = time - time.mean()
-    # z = c t² + ..: acceleration 2 c, downwards positive below.
-    curve = np.polyfit(middle, height, 2)
-    straight = np.sqrt(np.mean((np.polyval(curve, middle) - height) ** 2)) < _PARABOLA
-    return bool(straight and -2 * curve[0] >= _FALLS * gravity)
+    for some in (whole, whole & _on(trial, "pelvis")):
+        if some.any():
+            mean, middle = height[:, some].mean(axis=1), time - time.mean()
+            # z = c t² + ..: acceleration 2 c, downwards positive below.
+            curve = np.polyfit(middle, mean, 2)
+            straight = np.sqrt(np.mean((np.polyval(curve, middle) - mean) ** 2)) < _PARABOLA
+            if straight and -2 * curve[0] >= _FALLS * trial.settings.gravity:
+                return True
+    return False
 
 
 def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
@@ -94,8 +127,6 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
     By Newton the ground carries weight (1 + a / g), with a the vertical acceleration of pelvis and trunk. Where the
     plates lack a good part of it for a while, and nothing of it at all other times, something else carries.
     """
-    from scipy.ndimage import uniform_filter1d
-
     lacks = share_lacking(trial, weight=weight)
     found = np.zeros(lacks.size, dtype=bool)
     if not lacks.any() or trial.markers is None:
@@ -115,8 +146,6 @@ def share_lacking(trial: Trial, *, weight: float) -> Array:
     move as they do; zero where nothing tells it: no markers or weight, forces that are unknown, half a parabola from an
     end of the recording.
     """
-    from scipy.signal import savgol_filter
-
     total, markers = trial.wrench.force[:, 2], trial.markers
     if markers is None or not weight > 0 or markers.time.size != total.size or total.size < 2:
         return np.zeros(total.size)
@@ -204,15 +233,6 @@ def _of_plate(trial: Trial, place: Footing, rests: Mask, load: Mask, index: int)
     )
 
 
-def _by_reason(found: Sequence[_Unmeasured]) -> dict[LeftOut, Mask]:
-    """Return the frames (T,) of every reason that holds somewhere."""
-    masks: dict[LeftOut, Mask] = {}
-    for one in found:
-        if one.frames.any():
-            masks[one.reason] = masks.get(one.reason, False) | one.frames
-    return masks
-
-
 def _unmeasured_notes(measured: Mask, found: Sequence[_Unmeasured]) -> tuple[str, ...]:
     """Return how many frames are ``measured`` (T,), and how many are not for every reason ``found``, in words."""
     counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
@@ -295,8 +315,6 @@ def _resting(speed: Array, time: Array, *, still: float, lasting: float) -> Mask
 
 def dilate(mask: Mask, frames: int) -> Mask:
     """Return ``mask`` (T, ...) widened by ``frames`` before and after every True."""
-    from scipy.ndimage import maximum_filter1d
-
     return np.asarray(maximum_filter1d(mask, 2 * frames + 1, axis=0, mode="nearest")) if mask.size else mask
 
 
@@ -403,11 +421,24 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
     borne = feet.load & ~feet.seated[:, None]
     found = _unmeasured_frames(trial, place, feet, borne)
     measured = ~np.any([one.frames for one in found], axis=0)
+    left_out: dict[LeftOut, Mask] = {}
+    for one in found:
+        if one.frames.any():
+            left_out[one.reason] = left_out.get(one.reason, False) | one.frames
     outside = cop_outside(trial.plates, soles, place, feet.pressed)
+    hang = (
+        f"The person sits on something that stands on the plates in {int(feet.seated.sum())} of {feet.seated.size} "
+        f"frames: they carry the weight, and both feet hang."
+    )
+    unplaced = [plate.name for plate in trial.plates if not plate.placed]
+    nowhere = (
+        f"Where {', '.join(unplaced)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
+        f"pressure is under it, and a foot partly beside its plate cannot be seen."
+    )
     notes = (
         _unmeasured_notes(measured, found)
-        + _seated_note(feet.seated)
-        + _unplaced(trial)
+        + (hang,) * bool(feet.seated.any())
+        + (nowhere,) * bool(unplaced)
         + feet.belted
         + surfaces.notes
         + overhang_notes(trial.plates, soles, feet.rests & touching & ~place.covered & (place.share > 0))
@@ -420,16 +451,7 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
         if (_unread(place, feet.rests, borne, index) & ((inside(plate, soles.outline) >= 0).mean(axis=2) > 0.5)).any()
     )
     return Contact(
-        soles.time, touching, place.on_plate, measured, outside, notes, told, _by_reason(found), feet.seated, silent
-    )
-
-
-def _seated_note(seated: Mask) -> tuple[str, ...]:
-    if not seated.any():
-        return ()
-    return (
-        f"The person sits on something that stands on the plates in {int(seated.sum())} of {seated.size} frames: they "
-        f"carry the weight, and both feet hang.",
+        soles.time, touching, place.on_plate, measured, outside, notes, told, left_out, feet.seated, silent
     )
 
 
@@ -454,17 +476,6 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
     found = (low & (speed < rules.speed)).any(axis=2)
     frames = 0 if soles.time.size < 2 else int(np.ceil(rules.around / np.median(np.diff(soles.time))))
     return dilate(found, frames) | unseen
-
-
-def _unplaced(trial: Trial) -> tuple[str, ...]:
-    """Say what cannot be known of plates whose place the file does not tell."""
-    names = [plate.name for plate in trial.plates if not plate.placed]
-    if not names:
-        return ()
-    return (
-        f"Where {', '.join(names)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
-        f"pressure is under it, and a foot partly beside its plate cannot be seen.",
-    )
 
 
 def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules) -> tuple[str, ...]:

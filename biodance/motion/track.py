@@ -17,7 +17,6 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.time_axis import of_postures
 from biodance.lab.prepare import USUAL_CUTOFF, LowPass, low_pass, motion_filter
-from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.motion.ik.inverse_kinematics import (
     FrameStatus,
     InverseKinematics,
@@ -25,7 +24,7 @@ from biodance.motion.ik.inverse_kinematics import (
     general_jacobian,
     solve_ik,
 )
-from biodance.motion.kinematics import neighbours, poses
+from biodance.motion.kinematics import Chart, Smooth, chart_of, continued, neighbours, poses
 from biodance.records import AngleState, Array, Markers, Motion, Trial
 from biodance.records.arrays import rate_of
 from biodance.records.attention import Doubt
@@ -86,14 +85,12 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
 
 def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array, Array]:
     """Return posture (B, nq), v and a (B, nv) from ``chart`` coordinates; ``near`` (n, B) rad picks angles."""
-    joints, n_root = chart.joints, chart.n_root
-    posture = chart.posture(at, near)
+    n_root, posture = chart.n_root, chart.posture(at, near)
     v, a = np.empty((2, n_root + chart.joint_count, near.shape[1]))
     v[n_root + chart.single], a[n_root + chart.single] = first.angle, second.angle
-    angles = joints.angles_of(posture[len(posture) - chart.joint_count :])
-    rates = _ball_rates(joints, angles, at.ball, first.ball, second.ball)
-    for k in range(3):
-        v[n_root + joints.first + k], a[n_root + joints.first + k] = rates[0][k], rates[1][k]
+    angles = posture[len(posture) - chart.joint_count :][chart.ball]
+    balls = n_root + chart.ball
+    v[balls], a[balls] = _ball_rates(chart.sign, angles, at.ball, first.ball, second.ball)
     if n_root:
         v[:6], a[:6] = _root_rates(at, first, second)
     return posture.T, v.T, a.T
@@ -161,9 +158,8 @@ def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array
     return np.concatenate([linear, omega], axis=1).T, np.concatenate([acceleration, alpha], axis=1).T
 
 
-def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
+def _ball_rates(sign: Array, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
     """Return rates and accelerations (3, G, T) of ball joints' angles from quaternions (4, G, T)."""
-    sign = joints.sign
     at, first, second = (np.moveaxis(one, 0, -1) for one in (at, first, second))
     back = quaternion_conjugate(at)
     half, change = (np.moveaxis(quaternion_product(one, back), -1, 0) for one in (first, second))

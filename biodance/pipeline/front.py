@@ -16,7 +16,6 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
-from biodance.lab.session.write import registered_folder, write_registered
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.soles import soles_from_body
 from biodance.motion.track import track
@@ -31,9 +30,9 @@ from biodance.pipeline.session import by_paper, followed, identification_of, ide
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Motion, Session, Trial
+from biodance.registration import Limits, Registration, concluded, registered_folder, rival_delays, write_registered
 from biodance.registration.alignment import Alignment, Forces, alignments, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
-from biodance.registration.registration import Limits, Registration, concluded, rival_delays
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 

@@ -17,6 +17,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.records import SIDES, Array, Subject
 from biodance.spatial import zero_moment_point
 from biodance.virtual_lab.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.movement import STAND, Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.movement.performance import (
     ARM,
     PERFORMERS,
@@ -27,8 +28,7 @@ from biodance.virtual_lab.movement.performance import (
     copy_dance,
 )
 from biodance.virtual_lab.movement.posing import septic
-from biodance.virtual_lab.movement.protocol import STAND, Protocol, TrialPlan, read_protocol
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.simulate import check_simulated, write_visit
 from biodance.virtual_lab.simulate import simulate_session as write_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance import display
+from biodance.cycles import EMG
 from biodance.cycles.curves import CurveGroup
-from biodance.cycles.movement import EMG
 from biodance.cycles.scores import (
     FEATURES,
     deviation_reference,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from biodance import display
 from biodance.body.human.conventional import ConventionalModel, conventional_model
-from biodance.cycles.movement import TrialMovement
+from biodance.cycles import TrialMovement
 from biodance.cycles.scores import GaitScores, gait_scores
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of

@@ -11,7 +11,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.conventional import ConventionalModel
 from biodance.body.human.skeleton import marker_groups
-from biodance.cycles.movement import TrialMovement, trial_movement
+from biodance.cycles import TrialMovement, trial_movement
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point

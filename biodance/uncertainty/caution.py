@@ -10,9 +10,9 @@ import functools
 import numpy as np
 
 from biodance.body.parts import TENSOR, JointError
+from biodance.body.tables.anthropometry import read_segment_table
 from biodance.body.tables.choice import BASE, PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
-from biodance.body.tables.segment_data import read_segment_table
 from biodance.records import Array, Sip
 from biodance.spatial import skew
 

@@ -12,13 +12,12 @@ from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName, refuse_unknown
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Subject
+from biodance.virtual_lab.movement import Protocol
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.posing import septic
-from biodance.virtual_lab.movement.protocol import Protocol
-from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
+from biodance.virtual_lab.person import CARRIERS, MERGED, AddedLoad, Person, load_on, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, stream
 from biodance.virtual_lab.recording_faults import FAULTS, Clock, axis_index, with_target
-from biodance.virtual_lab.truth import CARRIERS, MERGED, load_on
 from biodance.virtual_lab.visit import FIRST_VISIT, Fault, LabVisit
 
 GRIPS = {

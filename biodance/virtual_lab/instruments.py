@@ -10,11 +10,9 @@ import numpy as np
 from biodance.body.parts import GRAVITY, SegmentMarkers
 from biodance.lab.c3d.write import PlateRecording
 from biodance.motion.kinematics import Poses, poses
-from biodance.records import SIDES, Array, Markers
+from biodance.records import Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
-from biodance.virtual_lab.movement.protocol import STAND
-from biodance.virtual_lab.person import skeleton
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person import Person, reference_angles, skeleton
 
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
@@ -92,16 +90,6 @@ def draw_soft_tissue(
     pull = pulled * tolerances.soft_tissue * scale[..., None] * direction
     # Static displacement of a spring: specific force over w².
     return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
-
-
-def reference_angles(person: Person) -> Array:
-    """Return the true joint angles (39,) rad in which the markers were glued: upright, arms slightly away, or bent."""
-    angles = dict(person.habits.angles) | dict(person.bent)
-    for side in SIDES:
-        flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
-        angles |= {f"{side}_shoulder_flexion": flexion, f"{side}_shoulder_adduction": adduction}
-        angles |= {f"{side}_shoulder_rotation": rotation, f"{side}_elbow_flexion": elbow}
-    return np.array([angles.get(joint.name, 0.0) for joint in person.body.joints])
 
 
 def skin_displacement(

@@ -7,22 +7,35 @@ OUT/truth/truth.json                   what only the simulation knows; no other 
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.session.results_folder import whole_folder
-from biodance.records import Subject
+from biodance.records import Array, Sip, Subject
 from biodance.threads import one_thread
+from biodance.version import __version__
 from biodance.virtual_lab.causes import wobbling_mass
+from biodance.virtual_lab.movement import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.movement.performance import Performance
-from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
-from biodance.virtual_lab.person.person import AddedLoad, Person, make_person, with_prostheses
+from biodance.virtual_lab.person import (
+    CARRIERS,
+    AddedLoad,
+    Person,
+    make_person,
+    merged_sip,
+    of_parameters,
+    parameters_of_inertia,
+    place_in_12,
+    place_inertia,
+    true_frames,
+    with_prostheses,
+)
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.truth import CARRIERS, truth
 from biodance.virtual_lab.visit import (
     FIRST_VISIT,
     SWINGING,
@@ -165,3 +178,118 @@ def session_toml(person: Person, protocol: Protocol, mass: float, *, joints: str
     for trial in protocol.trials:
         lines += ["", f'[trials."{trial.name}"]', f'role = "{trial.role}"']
     return "\n".join(lines) + "\n"
+
+
+def _segments(sip: Sip) -> list[dict[str, Any]]:
+    """Return per segment mass, CoM and inertia [Ixx Ixy Iyy Ixz Iyz Izz] about and in the segment's joint frame."""
+    return [
+        {"name": name, "mass_kg": float(p[0]), "com_m": (p[1:4] / p[0]).tolist(), "inertia_kgm2": p[4:].tolist()}
+        for name, p in zip(sip.segments, sip.phi.reshape(-1, 10), strict=True)
+    ]
+
+
+def truth(person: Person, protocol: str, instruments: Instruments, performances: list[Performance]) -> dict[str, Any]:
+    """Return the whole truth of a session, ready for JSON (SI units in the key names)."""
+    bare, loaded = person.body, person.loaded_body
+    markers, carried = bare.markers, dict(zip(bare.segment_joint, TRUE_SEGMENTS, strict=True))
+    return {
+        "version": __version__,
+        "protocol": protocol,
+        "seed": person.seed,
+        "session": instruments.visit.number,
+        "subject": {"mass_kg": person.subject.mass, "height_m": person.subject.stature, "sex": person.subject.sex},
+        "mass_with_loads_kg": person.mass,
+        "loads": [_load(person, load) for load in person.loads],
+        "static_pose": _static_pose(person, instruments, performances),
+        "segments_12": _segments(merged_sip(person, bare)),
+        "segments_12_with_loads": _segments(merged_sip(person, loaded)),
+        "segments_16": _segments(bare.sip),
+        "segments_16_with_loads": _segments(loaded.sip),
+        # each anatomical joint in the frame of the true segment next to it on the side of the pelvis
+        "joint_centres": {
+            joint.name.rsplit("_", 1)[0]: {"segment": carried[joint.parent], "place_m": joint.translation.tolist()}
+            for joint in bare.joints
+            if joint.parent in carried
+        },
+        "size_m": dict(person.size.size),
+        "markers": {
+            name: {"segment": TRUE_SEGMENTS[s], "place_m": place.tolist()}
+            for name, s, place in zip(markers.names, markers.segment, markers.position, strict=True)
+        },
+        "habits": asdict(person.habits),
+        "tolerances": asdict(instruments.visit.tolerances),
+        "laboratory": {k: v for k, v in asdict(instruments.visit.laboratory).items() if k != "tolerances"},
+        "instruments": {
+            "tilt": instruments.tilt.tolist(),
+            "plates": [
+                {
+                    "side": plate.side,
+                    "corners_surveyed_m": plate.corners.tolist(),
+                    "true_rotation": plate.turn.tolist(),
+                    "true_centre_m": plate.centre.tolist(),
+                    "mixing": plate.mixing.tolist(),
+                    "offset": plate.offset.tolist(),
+                }
+                for plate in instruments.plates
+            ],
+        },
+        "trials": [
+            {
+                "name": p.plan.name,
+                "role": p.plan.role,
+                "duration_s": p.plan.duration,
+                "balance_error_m": p.balance_error,
+            }
+            for p in performances
+        ],
+    }
+
+
+def _static_pose(person: Person, instruments: Instruments, performances: list[Performance]) -> dict[str, Any] | None:
+    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time), if any."""
+    static = next((p for p in performances if p.plan.role == "static"), None)
+    if static is None:
+        return None
+    time = round(0.5 * static.plan.duration, 2)
+    frames = true_frames(person, person.body, static.motion(np.array([time])).q[0])[0]
+    tilt = instruments.tilt
+    segments = [
+        {"name": n, "rotation": (tilt @ turn).tolist(), "position_m": (tilt @ at).tolist()}
+        for n, (turn, at) in frames.items()
+    ]
+    return {"trial": static.plan.name, "time_s": time, "segments_12": segments}
+
+
+def _load(person: Person, load: AddedLoad) -> dict[str, Any]:
+    """Return a load in the 12-segment model, and on the true segment that carries it."""
+    segment, place = place_in_12(person, load)
+    return {
+        "segment": segment,
+        "mass_kg": load.mass,
+        "place_m": place.tolist(),
+        "carried_by": load.segment,
+        "place_on_carrier_m": load.place.tolist(),
+        "radii_of_gyration_m": load.radii.tolist(),
+    }
+
+
+def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array) -> Sip:
+    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that
+    model would find.
+
+    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's
+    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial. Joint
+    centres and axes differ between truth and model, so the numbers do; the body is the same.
+    """
+    phi = []
+    for segment, pose, turn, place in zip(
+        document["segments_12"], document["static_pose"]["segments_12"], rotation, position, strict=True
+    ):
+        own = np.array(
+            [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
+        )
+        # new_R_lab lab_R_own, and the own origin in the new frame.
+        there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
+        phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
+    flat = np.concatenate(phi)
+    return Sip(tuple(segment["name"] for segment in document["segments_12"]), flat, np.zeros((flat.size, flat.size)))

@@ -24,10 +24,10 @@ from biodance.virtual_lab.instruments import (
     lay_plate,
     sense_plate,
 )
+from biodance.virtual_lab.movement import TrialPlan
 from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
-from biodance.virtual_lab.movement.protocol import TrialPlan
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.person.skeleton import MARKER_RADIUS, REALISTIC, LabTolerances, small_rotation, stream
 
 CAMERAS = (1.0e-5, 3.0e-4)

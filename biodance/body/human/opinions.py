@@ -61,50 +61,21 @@ def _mean_fraction(kind: str, sex: Sex) -> tuple[float, float]:
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
 
 
-def stadium(girth: Array, aspect: Array) -> tuple[Array, Array]:
-    """Return radius r and half length t (n,) m of stadia from their girths (n,) m and breadth over depth (n,), at
-    least 1: girth = 2 pi r + 4 t, breadth over depth = (r + t) / r.
+def stack_volume(level: Array, girth: Array, aspect: Array, *, length: float) -> float:
+    """Return the volume, m³, of stadium-shaped sections stacked along a segment of ``length`` m.
+
+    ``level`` (n,) ascending, shares of the length from the proximal end (the first section reaches up to 0, the last to
+    1); ``girth`` (n,) m = 2 pi r + 4 t; ``aspect`` (n,) breadth over depth = (r + t) / r, at least 1, of a stadium with
+    half circles of radius r, apart by 2 t. Between sections r and t are linear.
     """
-    # girth = 2 pi r + 4 t with t = (aspect - 1) r.
     radius = np.asarray(girth) / (2 * np.pi + 4 * (np.asarray(aspect) - 1))
-    return radius, (np.asarray(aspect) - 1) * radius
-
-
-def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -> RigidInertia:
-    """Return volume (as ``mass``, m³), centroid and second moments of volume of a stack along -y from the origin.
-
-    Parameters
-    ----------
-    level : array_like
-        (n,) ascending, share of the length from the proximal end; the first section reaches up to 0, the last to 1.
-    girth : array_like
-        (n,) m.
-    aspect : array_like
-        (n,) breadth (z) over depth (x).
-    length : float
-        m.
-
-    Returns
-    -------
-    RigidInertia
-        x anterior, y up, z right, origin in the middle of the proximal section; inertia (m⁵) about the centroid.
-    """
-    radius, half = stadium(girth, aspect)
     ends = np.unique(np.concatenate([[0.0], level, [1.0]]))
     low, step = ends[:-1, None], np.diff(ends)[:, None]
     # Gauss-Legendre nodes of every interval between sections.
     place = (low + step * (1 + _NODES) / 2).ravel()
-    weight = (step * _WEIGHTS / 2).ravel() * length
-    r, t, y = np.interp(place, level, radius), np.interp(place, level, half), -place * length
-    area = np.pi * r**2 + 4 * r * t
-    volume = float(weight @ area)
-    middle = float(weight @ (area * y)) / volume
-    # Second moments about the stadium's axes: circle, rectangle 2 t by 2 r, and half circles moved apart by t.
-    xx = weight @ (np.pi * r**4 / 4 + 4 * t * r**3 / 3)
-    zz = weight @ (np.pi * r**4 / 4 + 8 * t * r**3 / 3 + np.pi * r**2 * t**2 + 4 * r * t**3 / 3)
-    yy = weight @ (area * (y - middle) ** 2)
-    # Second moments xx, yy, zz of volume: the inertia about x is yy + zz.
-    return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
+    r, t = (np.interp(place, level, one) for one in (radius, (np.asarray(aspect) - 1) * radius))
+    # Area of the two half circles and of the rectangle between them.
+    return float((step * _WEIGHTS / 2).ravel() * length @ (np.pi * r**2 + 4 * r * t))
 
 
 _CONTRADICTION = 0.15  # Share of the body mass by which girths, or a scan, may miss it
@@ -213,11 +184,11 @@ def _part_solid(
     people = {kind: grown * length for kind, length in reference.lengths.items()}
     length = _part_length(part, reference, sizes)
     usual_length = _part_length(part, reference, people | {"stature": grown * reference.stature})
-    volume = stadium_stack(level, girth, aspect, length=length).mass
-    mean = stadium_stack(level, usual, aspect, length=usual_length).mass
+    volume = stack_volume(level, girth, aspect, length=length)
+    mean = stack_volume(level, usual, aspect, length=usual_length)
     more = [girth * np.exp(_STEP * one) for one in np.eye(len(rows))]
     # d log V / d log girth, by a step of one girth at a time.
-    slope = np.array([np.log(stadium_stack(level, one, aspect, length=length).mass / volume) / _STEP for one in more])
+    slope = np.array([np.log(stack_volume(level, one, aspect, length=length) / volume) / _STEP for one in more])
     tape, untold = error_size("girth", "tape"), error_size("girth", "untold")
     # Errors of the tape through the prediction; of what no tape told, its own.
     covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)

@@ -18,10 +18,10 @@ from biodance.body.tables.anthropometry import (
     AnthropometricTable,
     Reference,
     proportion,
+    read_segment_table,
     read_table,
     row_numbers,
 )
-from biodance.body.tables.segment_data import read_segment_table
 from biodance.records import SIDES, Array, Subject
 from biodance.settings import STANDARD_GRAVITY
 

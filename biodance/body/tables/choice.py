@@ -14,8 +14,17 @@ from functools import cache
 import numpy as np
 
 from biodance.body.parts import RigidInertia, combine_inertias, inertial_parameters, smallest_eigenvalues
-from biodance.body.tables.anthropometry import COUNT, KINDS, Reference, Sex, normalised_person, proportion
-from biodance.body.tables.segment_data import FAMILY, SegmentTable, read_segment_table
+from biodance.body.tables.anthropometry import (
+    COUNT,
+    FAMILY,
+    KINDS,
+    Reference,
+    SegmentTable,
+    Sex,
+    normalised_person,
+    proportion,
+    read_segment_table,
+)
 from biodance.errors import BiodanceError, FileRefused, UnknownName, known_index
 from biodance.records import Subject
 

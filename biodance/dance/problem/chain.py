@@ -15,7 +15,7 @@ import numpy as np
 from biodance.body.body import Body, load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
-from biodance.motion.ik.legs import GeneralLeg, Leg
+from biodance.motion.ik.compiled.legs import GeneralLeg, Leg
 from biodance.records import SIDES, Array, Motion
 from biodance.spatial import axis_rotation
 from biodance.threads import Sendable

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
+from biodance.lab.c3d import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
 
 _CLIPPED = 65535
 """What 16-bit frame numbers hold in a longer recording: TRIAL, LONG_FRAMES or the length of the file tells more."""

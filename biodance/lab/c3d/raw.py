@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from biodance.child_process import run_python
 from biodance.errors import FileRefused
+from biodance.lab.c3d import MIPS, RESAVE, Parameters, doubles, floats, read_header, read_parameters
 from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, texts
-from biodance.lab.c3d.parameters import MIPS, RESAVE, Parameters, doubles, floats, read_header, read_parameters
 from biodance.lab.markers.upright import METRES, PERSON_SPAN, extents, likely_unit
 from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array, any_coordinate, spread_frames

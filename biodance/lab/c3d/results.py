@@ -13,8 +13,8 @@ import numpy as np
 
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.c3d import label_rows, read_header
 from biodance.lab.c3d.layout import texts
-from biodance.lab.c3d.parameters import label_rows, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_raw, split_label
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import refuse_present, write_whole

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.c3d import Parameters
 from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
-from biodance.lab.c3d.parameters import Parameters
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label, unlabelled
 from biodance.records import Array, FootEvent, grouped
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
+from biodance.lab.c3d import C3D_BLOCK, INTEL
 from biodance.lab.c3d.subject import as_written
 from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.decode import plate_axes

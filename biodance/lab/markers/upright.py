@@ -22,10 +22,8 @@ WINDOW = 0.5
 _UNSEEN = 0.1  # m a frame: an unseen marker counts as one that moves so fast
 _STILL = 0.02  # m, standard deviation over half a second beyond which a marker does not stand still
 _BLOCK = 0.05  # s: the force is averaged over blocks of this length before it is judged
-_NUMBERS = 1_000_000  # Numbers ordered at once, so that a long trial needs little memory
 _MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
 """How far markers moved, kept as long as they live: reader, roles and checks ask for it."""
-_PLACES = 16  # As many places in an order are found without ordering all
 
 
 def movement(markers: Markers) -> float:
@@ -36,36 +34,10 @@ def movement(markers: Markers) -> float:
     as movement. NaN if no marker was ever seen.
     """
     if markers not in _MOVEMENT:
-        _MOVEMENT[markers] = _movement(markers)
+        seen = markers.xyz[:, markers.seen.any(axis=0)]
+        low, high = np.nanpercentile(seen, (2, 98), axis=0) if seen.size else np.full((2, 1, 3), np.nan)
+        _MOVEMENT[markers] = float(np.median(np.linalg.norm(high - low, axis=1)))
     return _MOVEMENT[markers]
-
-
-def _movement(markers: Markers) -> float:
-    seen = np.flatnonzero(markers.seen.any(axis=0))
-    if not seen.size:
-        return float("nan")
-    some, boxes = max(1, _NUMBERS // (3 * markers.time.size)), []
-    for start in range(0, seen.size, some):
-        low, high = _percentiles(markers.xyz[:, seen[start : start + some]], 0.02, 0.98)
-        boxes.append(np.linalg.norm(high - low, axis=1))
-    return float(np.median(np.concatenate(boxes)))
-
-
-def _percentiles(values: Array, *shares: float) -> list[Array]:
-    """Return `numpy.nanpercentile` of the numbers along the first axis at ``shares``, 20 times as fast."""
-    # Per column: how many are known, counted from zero.
-    last = np.isfinite(values).sum(axis=0) - 1
-    places = [share * last for share in shares]
-    around = [(np.floor(at).astype(int), np.minimum(np.floor(at).astype(int) + 1, last)) for at in places]
-    needed = np.unique(around)
-    few = needed.size <= _PLACES and needed[0] >= 0
-    ordered = np.partition(values, needed, axis=0) if few else np.sort(values, axis=0)  # NaN last
-    found = []
-    for at, (below, above) in zip(places, around, strict=True):
-        low, high = (np.take_along_axis(ordered, place[None], axis=0)[0] for place in (below, above))
-        # Linear between the two ordered values around the place.
-        found.append(low + (at - below) * (high - low))
-    return found
 
 
 def is_still(trial: Trial) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS, PlateParameters
+from biodance.lab.plates import CONTENT, FOUR_SENSORS, PlateParameters
 from biodance.records import Array, Mask, runs
 from biodance.settings import TOUCH_FORCE
 

@@ -15,6 +15,15 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.upright import movement, steady_mass
+from biodance.lab.plates import (
+    C3D_ONLY,
+    NOTHING_TOLD,
+    POUND,
+    PlateParameters,
+    Told,
+    ToldPlate,
+    declared_plates,
+)
 from biodance.lab.plates.decode import (
     FOOT_HEIGHT,
     LARGEST_SHARE,
@@ -23,15 +32,6 @@ from biodance.lab.plates.decode import (
     decode_plate,
     left_out_said,
     plate_axes,
-)
-from biodance.lab.plates.parameters import (
-    C3D_ONLY,
-    NOTHING_TOLD,
-    POUND,
-    PlateParameters,
-    Told,
-    ToldPlate,
-    declared_plates,
 )
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
 from biodance.records import Array, Defect, Markers, Plate, Trial, Wrench, grouped

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.errors import TrialRefused
+from biodance.lab.plates import CONTENT, FOUR_SENSORS
 from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading, left_out_said
-from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS
 from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point

@@ -18,7 +18,7 @@ from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
 from biodance.lab.markers.signals import unseen_at_origin, without_frozen
 from biodance.lab.plain_text import decode, read_bytes
-from biodance.lab.plates.parameters import Told
+from biodance.lab.plates import Told
 from biodance.lab.plates.read import as_told
 from biodance.records import Role, Trial
 
@@ -28,7 +28,7 @@ class Reader(Protocol):
 
     A reader may also have ``beside(path)``: the path of a second file that it reads together with the first and that is
     then no recording of its own (forces beside markers), None without one. With ``FOLLOWS_TOLD = True`` its ``read``
-    takes ``told`` (`biodance.lab.plates.parameters.Told`), what the analyst says of the plates, which it must follow;
+    takes ``told`` (`biodance.lab.plates.Told`), what the analyst says of the plates, which it must follow;
     to the plates of other readers corners, foot and use are applied afterwards.
     """
 

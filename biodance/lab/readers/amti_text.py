@@ -8,8 +8,8 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import COMMAS_READ, parse_number, plain_table, read_bytes, read_text, sha256, with_points
+from biodance.lab.plates import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE, find_baseline, loaded_samples
-from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.sense import gravity_sign, sensor_below, wrench_in_lab
 from biodance.lab.readers import head_text
 from biodance.library import read_toml

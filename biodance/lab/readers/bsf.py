@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import LARGEST_NUMBER, read_bytes, sha256
+from biodance.lab.plates import INCH, POUND
 from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE
-from biodance.lab.plates.parameters import INCH, POUND
 from biodance.lab.readers.amti_text import PLATE_UPRIGHT, amti_plate
 from biodance.records import Array, Role, Source, Trial
 from biodance.settings import STANDARD_GRAVITY

@@ -13,8 +13,8 @@ from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import MarkerSet, recognise
 from biodance.lab.markers.upright import axis_to_head, clear_axis, extents, turn_to
+from biodance.lab.plates import Told
 from biodance.lab.plates.decode import is_rectangle
-from biodance.lab.plates.parameters import Told
 from biodance.lab.plates.read import read_plates
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
 

@@ -25,8 +25,8 @@ from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
 from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
 from biodance.lab.plain_text import Cells, clean_label, header_of, is_parquet, read_bytes, read_cells, sha256
+from biodance.lab.plates import C3D_ONLY, FORCE, MOMENT, NOTHING_TOLD, Told, channel_groups, plain_unit
 from biodance.lab.plates.decode import around_pressures, find_baseline, plate_axes
-from biodance.lab.plates.parameters import C3D_ONLY, FORCE, MOMENT, NOTHING_TOLD, Told, channel_groups, plain_unit
 from biodance.lab.plates.read import PlatesRead
 from biodance.lab.readers import head_text
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Role, Source, Trial, Wrench

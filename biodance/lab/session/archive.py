@@ -20,7 +20,7 @@ from biodance.lab.plain_text import (
     sha256,
     with_points,
 )
-from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
+from biodance.lab.plates import FORCE, MOMENT, plain_unit
 from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_in

@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict
 from biodance.errors import SessionRefused, TrialRefused, UnknownName, did_you_mean
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.markers.sets import MARKED_SEGMENTS
+from biodance.lab.plates import CHANNELS_OF_TYPE, CONTENT, ToldPlate, channel_groups, plate_parameters
 from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE, corners_in_lab
-from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT, ToldPlate, channel_groups, plate_parameters
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Plate, Session, Trial
 

@@ -58,7 +58,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused, did_you_mean
 from biodance.lab.markers.sets import parse_map
-from biodance.lab.plates.parameters import Told, ToldPlate
+from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.session.entries import (
     PlateEntry,
     TrialParts,

@@ -2,40 +2,245 @@
 respected.
 
 Each frame minimises its weighted squared marker distances by itself (Lu & O'Connor 1999, DOI
-10.1016/S0021-9290(98)00158-4); the other frames only serve the first guess, and stand in where a frame's own markers
-leave the posture open.
+10.1016/S0021-9290(98)00158-4), from first guesses by its markers or from its neighbours; the other frames only serve
+that guess, and stand in where a frame's own markers leave the posture open.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import partial
+from functools import partial, reduce
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import median_filter
+from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.motion.ik.compiled import newton
 from biodance.motion.ik.compiled.ball_step import continue_angles
-from biodance.motion.ik.search import (
-    MORE_SHARES,
-    SHARES,
-    MarkerProblem,
-    Minimum,
-    from_guess,
-    from_markers,
-    interpolate_postures,
-    marker_distances,
-    marker_problem,
-    minimise_markers,
-    search,
-)
-from biodance.motion.kinematics import place_jacobian, poses
-from biodance.records import Array, Index, Markers
+from biodance.motion.ik.compiled.newton import MarkerChain, chain_of
+from biodance.motion.kinematics import Chart, chart_of, place_jacobian, poses
+from biodance.records import Array, Index, Markers, assign
+from biodance.spatial import rigid_fit
+
+_STEPS = 200  # Most Newton steps of a frame
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerProblem:
+    """A body against T frames of measured markers: ``segment`` (K) that carries each, ``xyz`` (T, K, 3) m (anything
+    finite where hidden), ``weight`` (T, K) >= 0, zero where hidden; ``tolerance`` m, largest slope of a solved frame.
+    """
+
+    body: Body
+    chain: MarkerChain
+    chart: Chart
+    segment: list[int]
+    xyz: Array
+    weight: Array
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        """Keep ``xyz`` as a view that nothing writes to: one type for the compiled code, whatever was given."""
+        view = self.xyz.view()
+        view.flags.writeable = False
+        assign(self, xyz=view)
+
+
+class Minimum(NamedTuple):
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; largest ``slope`` (B,) m; ``steps`` (B,) tried."""
+
+    q: Array
+    cost: Array
+    slope: Array
+    steps: Index
+
+    def part(self, frames: Index) -> "Minimum":
+        """Return a copy of some frames."""
+        return Minimum(self.q[frames], self.cost[frames], self.slope[frames], self.steps[frames])
+
+    def put(self, frames: Index, part: "Minimum") -> None:
+        """Replace some frames."""
+        for mine, other in zip(self, part, strict=True):
+            mine[frames] = other
+
+
+def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: float) -> MarkerProblem:
+    """Return the problem of the body's markers ``columns`` (K) against ``xyz`` (T, K, 3) m, NaN = hidden."""
+    segment = [body.markers.segment[c] for c in columns]
+    seen = np.isfinite(xyz.sum(axis=2))
+    return MarkerProblem(
+        body=body,
+        chain=chain_of(body, segment, body.markers.position[columns]),
+        chart=chart_of(body),
+        segment=segment,
+        xyz=np.ascontiguousarray(xyz) if seen.all() else np.where(seen[:, :, None], xyz, 0.0),
+        weight=seen * body.markers.weight[columns],
+        tolerance=tolerance,
+    )
+
+
+def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = _STEPS) -> Minimum:
+    """Return the minima of ``frames`` (F,) reached from ``start`` (F, nq) in at most ``steps`` steps."""
+    count, joints = len(frames), len(problem.chain.lower)
+    q = np.array(start, order="C")
+    angles = q[:, q.shape[1] - joints :]
+    np.clip(angles, problem.chain.lower, problem.chain.upper, out=angles)
+    found = Minimum(q, np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    weight = np.ascontiguousarray(problem.weight)  # one type for the compiled code
+    newton.minimise_frames(problem.chain, problem.xyz, weight, frames, found, problem.tolerance, steps)
+    return found
+
+
+def marker_distances(problem: MarkerProblem, q: Array) -> Array:
+    """Return the distance (T, K) m between every marker and the model at the postures ``q`` (T, nq)."""
+    out = np.empty(problem.weight.shape)
+    newton.fill_distances(problem.chain, problem.xyz, q, out)
+    return out
+
+
+_EQUAL = 1e-9  # Share by which the costs of one posture may differ: what the tolerance of the descent leaves
+
+
+def better(one: Minimum, other: Minimum) -> Minimum:
+    """Return frame by frame the minimum of lower cost; of equal ones, ``one``."""
+    first = one.cost <= other.cost * (1 + _EQUAL)
+    return Minimum(
+        np.where(first[:, None], one.q, other.q),
+        np.where(first, one.cost, other.cost),
+        np.where(first, one.slope, other.slope),
+        one.steps + other.steps,
+    )
+
+
+_OTHERS = 0.01  # Weight of other segments' markers in the root's rigid fit, for where its own are hidden
+
+
+def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
+    """Return q (F, nq): angles at a ``share`` of their range (None: zero), the root where its markers say."""
+    lower, upper = problem.chain.lower, problem.chain.upper
+    angles = np.clip(np.zeros(len(lower)), lower, upper)
+    if share is not None:
+        with np.errstate(invalid="ignore"):  # of joints without limits
+            within = (1 - share) * lower + share * upper
+        angles = np.where(np.isfinite(within), within, angles)
+    return _place_root(problem, frames, np.tile(angles, (len(frames), 1)))
+
+
+def _place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
+    """Return q (F, nq) with ``angles`` (F, n) rad and the root's pose that fits the rigid body best."""
+    body, xyz = problem.body, problem.xyz[frames]
+    if not body.n_root:
+        return angles
+    # The body with its root at the origin, unturned.
+    root = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(angles), 1))
+    model = poses(body, np.concatenate([root, angles], axis=1)).points(problem.segment, problem.chain.local)
+    own = np.where(problem.chain.slot == 0, 1.0, _OTHERS) * problem.weight[frames]
+    rotation, place = rigid_fit(model, xyz, own)
+    return np.concatenate([place, Rotation.from_matrix(rotation).as_quat(), angles], axis=1)
+
+
+_STRIDES = (64, 16, 4, 1)
+"""Every 64th frame is solved from its own markers; then every 16th, 4th and each frame from those around it."""
+SHARES = (0.5, None)
+"""First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often
+than the reverse.
+"""
+MORE_SHARES = (0.25, 0.75)
+"""Further guesses for doubtful frames, and for all first frames of a short trial."""
+_SHORT = 640  # Frames below which a trial has too few neighbours to correct a frame that started wrongly
+_NEIGHBOURS = 11  # Frames whose median fit a frame is compared with
+_DOUBT = (1.5, 0.001)
+"""A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second
+(m).
+"""
+
+
+def search(problem: MarkerProblem, frames: Index) -> Minimum:
+    """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
+    count = len(frames)
+    out = Minimum(
+        np.zeros((count, problem.body.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
+    )
+    known = np.zeros(0, dtype=np.intp)
+    for stride in _STRIDES:
+        # Coarse frames first, the last one always; those between start from what is solved around them.
+        level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
+        if not known.size:
+            found = from_markers(problem, frames[level], SHARES if count > _SHORT else (*SHARES, *MORE_SHARES))
+        elif level.size:
+            found = minimise_markers(
+                problem, frames[level], interpolate_postures(problem, frames[known], out.q[known], frames[level])
+            )
+        else:
+            continue
+        out.put(level, found)
+        known = np.union1d(known, level)
+        if stride in (_STRIDES[0], _STRIDES[-1]):
+            out.put(known, _retry(problem, frames[known], out.part(known)))
+    return out
+
+
+def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | None, ...]) -> Minimum:
+    """Return the best of the minima reached from the first guesses at the given ``shares`` of the joint ranges."""
+    return reduce(
+        better, [minimise_markers(problem, frames, _guess_postures(problem, frames, share=share)) for share in shares]
+    )
+
+
+def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
+    """Return the minima reached from ``guess`` (F, nq), roots first put where markers say if nearer."""
+    moved = _place_root(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
+    own, other = (minimise_markers(problem, frames, q, steps=0) for q in (guess, moved))
+    return _retry(problem, frames, minimise_markers(problem, frames, better(own, other).q))
+
+
+def _retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
+    """Return ``found`` with doubtful frames tried again, from their markers and from sound frames beside."""
+    # cost = 1/2 sum w r².
+    rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
+    doubtful = rms > _DOUBT[0] * median_filter(rms, min(_NEIGHBOURS, len(rms)), mode="mirror") + _DOUBT[1]
+    sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
+    if not (bad.size and sound.size):
+        return found
+    best = better(found.part(bad), from_markers(problem, frames[bad], (*SHARES, *MORE_SHARES)))
+    after = np.searchsorted(sound, bad)
+    for neighbour in (sound[np.maximum(after - 1, 0)], sound[np.minimum(after, len(sound) - 1)]):
+        best = better(best, minimise_markers(problem, frames[bad], found.q[neighbour]))
+    out = found.part(np.arange(len(frames)))
+    out.put(bad, best)
+    return out
+
+
+def interpolate_postures(problem: MarkerProblem, known: Index, q: Array, wanted: Index) -> Array:
+    """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known``
+    (M,), increasing.
+
+    Monotone cubics in smooth coordinates (Fritsch & Butland 1984, DOI 10.1137/0905021), the ends kept outside.
+    """
+    after = np.searchsorted(known, wanted, side="right")
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(known) - 1)
+    near = np.where(wanted - known[before] < known[after] - wanted, before, after)
+    out, inside = q[near], (wanted >= known[0]) & (wanted < known[-1])
+    if inside.any():
+        smooth = problem.chart.smooth(q.T).stacked()
+        # One more point straight on at either end: the slope there is that of the first and of the last piece.
+        time, values = (
+            np.concatenate([2 * one[..., :1] - one[..., 1:2], one, 2 * one[..., -1:] - one[..., -2:-1]], axis=-1)
+            for one in (known, smooth)
+        )
+        at = problem.chart.split(PchipInterpolator(time, values, axis=1)(wanted[inside]))
+        limits = problem.chain.lower[:, None], problem.chain.upper[:, None]
+        out[inside] = problem.chart.posture(at, out[inside, q.shape[1] - len(limits[0]) :].T, *limits).T
+    return out
+
 
 _LEVER = 0.1  # m, what one radian is compared with: one metre of root translation counts as 10 rad
-
 _LEAST_MOTION = 0.02
 """Least share of its lever by which any unit change of posture must move the markers that it carries, for the
 posture to be determined.
@@ -73,7 +278,9 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> _D
     best = patterns.sum(axis=1).argmax()
     names = ("root x", "root y", "root z", "root rotation x", "root rotation y", "root rotation z")[: body.n_root]
     names += tuple(joint.name for joint, moves in zip(body.joints, body.free, strict=True) if moves)
-    vague = _open(_normal(jacobian, weight[best : best + 1])[0])
+    # Eigenvectors of small eigenvalues: changes of posture that the markers hardly see.
+    least, vector = np.linalg.eigh(_normal(jacobian, weight[best : best + 1])[0])
+    vague = (np.abs(vector[:, least < _LEAST_MOTION**2]) > 0.2).any(axis=1)
     return _Determination(
         value[which] >= _LEAST_MOTION**2, tuple(name for name, is_open in zip(names, vague, strict=True) if is_open)
     )
@@ -88,13 +295,6 @@ def _normal(jacobian: Array, weight: Array) -> Array:
     # sum over markers k of weight[p, k] J_k'J_k, then scaled on both sides.
     pairs = np.swapaxes(jacobian, 1, 2) @ jacobian
     return np.asarray(np.tensordot(weight, pairs, axes=1) * scale[:, :, None] * scale[:, None])
-
-
-def _open(normal: Array) -> NDArray[np.bool_]:
-    """Return (nv,) the coordinates that take part in a change of posture that the markers hardly see."""
-    # Eigenvectors of small eigenvalues: changes that hardly move a marker.
-    value, vector = np.linalg.eigh(normal)
-    return (np.abs(vector[:, value < _LEAST_MOTION**2]) > 0.2).any(axis=1)
 
 
 def general_jacobian(body: Body, columns: list[int]) -> Array:

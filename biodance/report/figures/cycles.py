@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from biodance.cycles import EMG
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.movement import EMG
 from biodance.cycles.scores import NormalCurve
 from biodance.cycles.summary import Repetitions
 from biodance.display import GREY, spaced

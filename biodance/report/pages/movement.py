@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.cycles.movement import EMG
+from biodance.cycles import EMG
 from biodance.cycles.scores import SCORE_ANGLES, GaitScores, NormalCurve
 from biodance.cycles.summary import (
     ANGLE_PANELS,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from biodance.cycles import TrialMovement
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.movement import TrialMovement
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.lab.session.results_folder import whole_folder

@@ -17,12 +17,12 @@ from scipy.spatial.transform import Rotation
 from biodance.body.body import load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
-from biodance.motion.ik.legs import Leg
+from biodance.motion.ik.compiled.legs import Leg
 from biodance.records import SIDES, Array, Wrench
+from biodance.virtual_lab.movement import GAITS, STAND, Gait, TrialPlan
 from biodance.virtual_lab.movement.performance import MARGIN, Performance, motion_through
 from biodance.virtual_lab.movement.posing import WIDTH, Curves, Z, septic, take_stance, turn_about, without_jumps
-from biodance.virtual_lab.movement.protocol import GAITS, STAND, Gait, TrialPlan
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, stream
 
 G = float(np.linalg.norm(GRAVITY))

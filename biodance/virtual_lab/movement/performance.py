@@ -23,9 +23,8 @@ from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, Role, Wrench, freeze
-from biodance.virtual_lab.movement import posing
-from biodance.virtual_lab.movement.protocol import TrialPlan
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.movement import TrialPlan, posing
+from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, smooth_noise, stream
 
 NODE_RATE = 100.0

@@ -17,10 +17,10 @@ from scipy.special import logsumexp
 
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
-from biodance.motion.ik.legs import LEG, Leg, soft_limit
+from biodance.motion.ik.compiled.legs import LEG, Leg, soft_limit
 from biodance.records import SIDES, Array
-from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
-from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.movement import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
+from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.person.skeleton import LabTolerances, smooth_noise
 
 _ENDS = np.cumsum([0, *map(len, FIELDS.values())]).tolist()

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.ik.chart import balls
 from biodance.motion.ik.compiled import compiled
 from biodance.motion.ik.compiled.ball_step import exponential, product, turned
-from biodance.motion.kinematics import joint_arrays
+from biodance.motion.kinematics import chart_of, joint_arrays
 from biodance.records import Array
 
 # All that the gradient and the second derivatives by a joint need are four sums over the markers that move with it,
@@ -84,7 +83,7 @@ class _Sums(NamedTuple):
 def chain_of(body: Body, segment: list[int], local: Array) -> MarkerChain:
     """Return the chain of ``body`` with markers at ``local`` (K, 3) m in the frames of the segments ``segment`` (K)."""
     parent, turn, translation, axis = joint_arrays(body)
-    root, joints = range(body.n_root), balls(body)
+    root, chart = range(body.n_root), chart_of(body)
     paths = [list(root[: k + 1]) for k in root]
     paths += [[*root, *(body.n_root + joint for joint in path)] for path in body.paths]
     depth = np.array([len(path) - 1 for path in paths], dtype=np.int64)
@@ -99,8 +98,8 @@ def chain_of(body: Body, segment: list[int], local: Array) -> MarkerChain:
         np.array(body.limits.upper, dtype=float),
         np.array([path + [0] * (int(depth.max()) + 1 - len(path)) for path in paths], dtype=np.int64),
         depth,
-        joints.first.astype(np.int64),
-        joints.sign[:, 0].astype(float),
+        chart.ball[0].astype(np.int64),
+        chart.sign[:, 0].astype(float),
         body.n_root,
     )
 
