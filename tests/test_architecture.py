@@ -103,6 +103,13 @@ ONE_ALGORITHM = {
     "motion/ik/compiled/newton.py": "the marker cost of a frame with its derivatives, and its minimum",
     "motion/soles.py": "where the soles are, over which surface and plate",
     "motion/track.py": "markers to a smooth motion: states of angles, cut-off, derivatives",
+    "identification/added_mass.py": "a load on one segment: its posterior, its place, the smallest to be found",
+    "pipeline/learn.py": "a laboratory over all its sessions: its plates, its tolerances, its healthy people",
+    "pipeline/movement.py": "what moved in a visit, and what of it the person measured is told",
+    "pipeline/still.py": "what is drawn of a body, an instant or a whole session",
+    "report/write.py": "what is written of a session, and the paragraph on its methods",
+    "uncertainty/session_noise.py": "the noise of cameras, plates and skin, by what a session itself shows",
+    "uncertainty/sources.py": "every elementary error of a person, forward and transpose",
     "settings.py": "every choice with its unit, range and meaning",
 }
 """Files of up to 500 lines, each one algorithm that nobody can follow once it is cut: cut at 300 lines, the way of a

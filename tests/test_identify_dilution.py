@@ -11,15 +11,13 @@ from scipy.signal import butter, sosfiltfilt
 from biodance.body.human.human import human
 from biodance.identification.calibration import gains_move_masses, undiluted
 from biodance.identification.identification import identify_body
-from biodance.identification.information import Information
 from biodance.identification.loads import compact_load
-from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import PAIRS, Fit, Statistics, layout_for, statistics
+from biodance.identification.posterior import Information, find_posterior
+from biodance.identification.statistics import PAIRS, Fit, Statistics, statistics
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
-from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.caution import widened_prior
-from biodance.uncertainty.noise import Noise
 
 BODY = human(Subject(70.0, 1.75, "M"))
 ABOUT = np.zeros(3)
@@ -41,7 +39,7 @@ def recorded(shake: float, noise_n: float = 1.0) -> Statistics:
     seen[:, trunk] += shake * noise / noise.std()
     motion = Motion(real.time, real.q, real.v, seen)
     fit = Fit("t", motion, Wrench(real.time, wrench), np.ones(3000, dtype=bool))
-    return statistics(BODY, fit, layout_for(ABOUT))
+    return statistics(BODY, (fit,), Noise.unit(ABOUT))
 
 
 @pytest.fixture(scope="module")

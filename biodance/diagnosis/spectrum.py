@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from biodance.effects import Case
 from biodance.errors import TrialRefused
 from biodance.records import Array, Markers, Motion, Wrench
-from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
 _RATE = 50.0

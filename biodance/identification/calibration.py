@@ -14,15 +14,12 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.identification.information import Information
-from biodance.identification.learning import learn_noise
-from biodance.identification.loads import with_room
+from biodance.identification.loads import PossibleTables, more_probable_table, with_room
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
-from biodance.identification.placement import PossibleTables, more_probable_table
-from biodance.identification.posterior import BodyPosterior, find_posterior
-from biodance.identification.statistics import PAIRS, Statistics
+from biodance.identification.posterior import BodyPosterior, Information, find_posterior
+from biodance.identification.statistics import PAIRS, Statistics, learn_noise
 from biodance.records import Array, Sip
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 _FAST = 1.0
 """Hz: bands that begin here or higher are calibrated; in slower ones the gain is 1 within 1 % on virtual people."""
@@ -163,17 +160,13 @@ def undo_dilution(
     for _ in range(_ROUNDS):
         table, _, _ = more_probable_table(now.data, tables, body)
         posterior = find_posterior(now.data, table)
-        real = undiluted(total, _with_probable_load(posterior, now.data, loads).mean, known, table)
+        # With a load where the data make one more probable: arms that are too light for what they carry show more
+        # than is predicted, and no dilution.
+        loaded = find_posterior(now.data, with_room(table, loads))
+        likely = max(posterior, loaded, key=lambda one: one.log_evidence)
+        real = undiluted(total, likely.mean, known, table)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN), found, room)
         # Gains are measured under these parameters: where they move them far, one stands in for the other.
         if gains_move_masses(posterior, find_posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
     return now
-
-
-def _with_probable_load(posterior: BodyPosterior, data: Information, loads: Array) -> BodyPosterior:
-    """Return the posterior with a load where the data make one more probable: arms that are too light for what they
-    carry show more than is predicted, and no dilution.
-    """
-    loaded = find_posterior(data, with_room(posterior.prior, loads))
-    return max(posterior, loaded, key=lambda one: one.log_evidence)

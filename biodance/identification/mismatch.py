@@ -17,14 +17,13 @@ from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.parts import shift_matter
 from biodance.body.tables.error_sizes import error_size
-from biodance.identification.information import Information
+from biodance.identification.posterior import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Index, Motion, Sip
-from biodance.uncertainty.bands import Bands
+from biodance.uncertainty.bands import Bands, Noise
 from biodance.uncertainty.caution import shift_slope
-from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
 from biodance.uncertainty.response import Response
 from biodance.uncertainty.sources import deviations, of_markers, transpose

@@ -17,13 +17,13 @@ import numpy as np
 from biodance.body.parts import TENSOR
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.identification import Identification
-from biodance.identification.information import Information
 from biodance.identification.knowledge import knowledge
 from biodance.identification.physical import FailedFit, PhysicalFit
-from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.identification.posterior import Information
+from biodance.identification.statistics import Fit, statistics, usable
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.bands import WHITE
+from biodance.uncertainty.bands import WHITE, Noise
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -126,8 +126,8 @@ def identify_as_paper(found: Identification, fits: tuple[Fit, ...]) -> Identific
     Where it has no solution, the fit failed.
     """
     used, about, _ = usable(found.body, fits)
-    layout = layout_for(about, WHITE)
-    data = statistics_together(found.body, used, layout).information(layout)
+    layout = Noise.unit(about, WHITE)
+    data = statistics(found.body, used, layout).information(layout)
     solved, frames = paper_programme(data, found.body), data.frames
     if solved.status == "failed":
         return replace(found, fit=solved, known=(), notes=(solved.cause,), frames=frames)

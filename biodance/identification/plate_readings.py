@@ -17,14 +17,13 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
-from biodance.identification.learning import START, WORTH
 from biodance.identification.mismatch import PlateRows, inverse_root, mismatch, softness
-from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.identification.statistics import START, WORTH, Fit, statistics, usable
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.threads import Sendable
+from biodance.uncertainty.bands import Noise
 from biodance.uncertainty.learning import noise_of
-from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import plate_errors, plate_sources
 
 
@@ -94,7 +93,7 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) 
         first = _readings(found, rows, body)
         # What the plates read is taken off before the noise is learned again.
         off = tuple(replace(f, wrench=Wrench(f.wrench.time, f.wrench.value - first.added(f, body))) for f in used)
-        left = statistics_together(found.body, off, layout_for(about, found.noise.bands))
+        left = statistics(found.body, off, Noise.unit(about, found.noise.bands))
         moments = left.moments(body.sip.phi, found.posterior.covariance)
         noise = replace(found.noise, covariance=noise_of(moments, start=START, worth=WORTH))
         told.append(_readings(found, _rows(found, used, noise, softer), body))
@@ -122,4 +121,4 @@ def _readings(found: Identification, rows: PlateRows, body: Body) -> PlateReadin
     slope = gain @ of_body
     # var(z) = var(z | phi) + D C D' with D = -gain of_body.
     covariance = after + slope @ found.posterior.covariance @ slope.T
-    return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, layout_for(found.noise.about))
+    return PlateReadings(gain @ (half @ rows.target - of_body @ phi), covariance, Noise.unit(found.noise.about))

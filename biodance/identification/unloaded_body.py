@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from biodance.identification.identification import Identification
-from biodance.identification.information import Information
-from biodance.identification.placement import ODDS, matter_follows_joint, with_matter_placed, with_sides
+from biodance.identification.loads import ODDS, matter_follows_joint, with_matter_placed, with_sides
+from biodance.identification.posterior import Information
 from biodance.records import Array, Sip
 from biodance.uncertainty.caution import in_other_frames
 
@@ -54,14 +54,10 @@ def tables_by_sides(session: Identification) -> tuple[tuple[Sip, float], ...]:
     """Return the table of ``session`` with sides alike and with each side on its own, each with its log probability: a
     load on one side may not pass for sides that are not alike, nor what a side has of its own for a load.
     """
-    alike, apart = (_with_sides_as(session, apart=apart) for apart in (False, True))
+    prior = session.posterior.prior
+    alike, apart = (prior if session.apart == one else with_sides(prior, apart=one) for one in (False, True))
     # Odds of 2 for alike sides as log probabilities: 1 / (1 + e^-odds) and 1 / (1 + e^odds).
     return (alike, float(-np.log1p(np.exp(-ODDS)))), (apart, float(-np.log1p(np.exp(ODDS))))
-
-
-def _with_sides_as(session: Identification, *, apart: bool) -> Sip:
-    prior = session.posterior.prior
-    return prior if session.apart == apart else with_sides(prior, apart=apart)
 
 
 def table_like(one: Identification, other: Identification) -> Sip:

@@ -10,8 +10,7 @@ from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
-from biodance.observations._landmark import landmark_along
-from biodance.observations._stance import step_course
+from biodance.observations._stance import landmark_along, step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),

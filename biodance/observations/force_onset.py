@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.effects.time_delay import TimeDelay
 from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._causes import Sensitivity
 from biodance.observations._stance import crossing, steps
 from biodance.records import Array
 
