@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identification.added_mass import MASSES, LoadCandidate, LoadPosterior, LoadSearch, added_mass
+from biodance.identification.added_mass import (
+    MASSES,
+    LoadCandidate,
+    LoadPosterior,
+    LoadSearch,
+    added_mass,
+    whiten_innovation,
+)
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.loads import compact_load, load_moments, unknown_loads, with_room
 from biodance.identification.statistics import learn_noise, standing_point, statistics
-from biodance.identification.unloaded_body import whiten_innovation
 from biodance.records import Sip
 from biodance.spatial import point_mass
 from biodance.uncertainty.bands import Noise

@@ -11,9 +11,8 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.body.human.human import human
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.mismatch import mismatch
-from biodance.identification.plate_readings import PlateReadings, plate_readings
 from biodance.identification.statistics import Fit, statistics
-from biodance.identification.validation import validate
+from biodance.identification.validation import PlateReadings, plate_readings, validate
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import _on_fitted_plates
 from biodance.records import Subject, Wrench

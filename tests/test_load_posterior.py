@@ -10,9 +10,11 @@ from biodance.identification.added_mass import (
     LoadPosterior,
     LoadSearch,
     LoadView,
+    inflate_prior,
     log_mass_prior,
+    scaled_to_mass,
+    unloaded_bodies,
 )
-from biodance.identification.unloaded_body import inflate_prior, scaled_to_mass, unloaded_bodies
 from biodance.pipeline.words import say_load
 from biodance.records import Sip
 

@@ -10,7 +10,7 @@ from found_loads import GAIN, NOTHING, OWN, found
 from identified_sessions import session_result
 
 from biodance.pipeline.diagnosis import as_diagnosed
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial import Check
 from biodance.pipeline.words import say_load
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.vector import round_ticks

@@ -14,10 +14,9 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.calibration import discounted, undo_dilution
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_interval, known_together
 from biodance.identification.loads import more_probable_table, possible_tables, unknown_loads, with_room
-from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
+from biodance.identification.mismatch import Mismatch, Sizes, discounted, mismatch, softness, undo_dilution
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.posterior import BodyPosterior, Information, find_posterior
 from biodance.identification.statistics import Fit, Statistics, learn_noise, statistics, usable

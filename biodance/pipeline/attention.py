@@ -13,7 +13,7 @@ from biodance.display import digits, listed, spaced
 from biodance.effects import CheckKind, QualityCheck
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check, Step, TrialResult
+from biodance.pipeline.trial import Check, Step, TrialResult
 from biodance.pipeline.words import (
     LOAD,
     alternatives,

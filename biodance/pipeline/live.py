@@ -39,8 +39,7 @@ from biodance.motion.soles import soles_from_body
 from biodance.motion.track import smooth, upright_trunk
 from biodance.pipeline.body import body_of
 from biodance.pipeline.still import asked_words
-from biodance.pipeline.trial import prepare_trial
-from biodance.pipeline.trial_result import Step
+from biodance.pipeline.trial import Step, prepare_trial
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.threads import one_thread

@@ -29,8 +29,7 @@ from biodance.motion.newton import QuietStanding
 from biodance.pipeline.lab_file import NO_LAB, HealthyReference, read_lab
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.session import examine
-from biodance.pipeline.trial import movement_of
-from biodance.pipeline.trial_result import OPEN
+from biodance.pipeline.trial import OPEN, movement_of
 from biodance.records import Session, Subject, by_name
 from biodance.settings import STANDARD_GRAVITY
 from biodance.threads import one_thread

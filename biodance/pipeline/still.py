@@ -3,7 +3,7 @@
 """
 
 from base64 import b64encode
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any
 
@@ -21,10 +21,41 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.newton import facing
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Still, TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.pipeline.words import size_and_segments
 from biodance.records import SIDES, Array, Motion, side_in_name
 from biodance.spatial import zero_moment_point
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """One instant to draw in 3-D.
+
+    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured;
+    ``plates`` (P, 4, 3) m corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN =
+    unloaded); ``forward`` (2,) unit vector the subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations``
+    (N, 3, 3) and ``positions`` (N, 3) m in the lab and their ``box_sides``; ``residual`` (3,) N measured minus
+    predicted force, ``load`` (3,) m place of a load that was found (NaN = none); ``about`` what the picture shows, one
+    sentence.
+    """
+
+    trial: str
+    time: float
+    bones: Array
+    sides: tuple[str, ...]
+    markers: Array
+    plates: Array
+    com: Array
+    force: Array
+    cop: Array
+    forward: Array
+    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
+    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
+    box_sides: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
+    load: Array = field(default_factory=lambda: np.full(3, np.nan))
+    about: str = ""
 
 
 def parent_segments(body: Body) -> list[int]:

@@ -10,8 +10,8 @@ from biodance.body.solids import ROUNDNESS
 from biodance.display import BLACK, GREEN, GREY, YELLOW
 from biodance.identification.validation import TrialValidation
 from biodance.motion.newton import QuietStanding
-from biodance.pipeline.still import FORCE_SCALE, RESIDUAL_SCALE
-from biodance.pipeline.trial_result import MarkerFit, Still, WrenchComparison
+from biodance.pipeline.still import FORCE_SCALE, RESIDUAL_SCALE, Still
+from biodance.pipeline.trial import MarkerFit, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures import vector as svg
 from biodance.report.figures.style import SIDE_COLOURS

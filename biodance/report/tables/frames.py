@@ -19,7 +19,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import CHANNELS, AngleState, Array
 from biodance.report.files import write_tables
 from biodance.report.tables.diagnosis import LIMIT_ROW

@@ -8,7 +8,7 @@ from biodance.cycles.scores import GaitScores
 from biodance.lab.prepare import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement, spatiotemporal_rows
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import CHANNELS, SIDES
 from biodance.report.tables.identification import (
     AGREEMENT_ROW,
