@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from biodance.body.parts import TENSOR
+from biodance.body.parts import TENSOR, inertia_tensor
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import knowledge
@@ -60,13 +60,6 @@ def directions() -> Array:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
-def _tensor(phi: Array) -> Array:
-    tensor = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        tensor[i, j] = tensor[j, i] = value
-    return tensor
-
-
 def inequalities(body: "Body") -> tuple[Array, Array]:
     """Return A (k, 10N), b (k,) of ``A phi >= b``: masses, CoM boxes and sampled directions (paper eq. 8-10)."""
     rows, level = [], []
@@ -85,7 +78,7 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
         wide = np.zeros((len(block), 10 * len(body.segments)))
         wide[:, 10 * s : 10 * s + 10] = block
         # Smallest eigenvalue first, as `eigvalsh` sorts.
-        eps = RELATIVE_EPS * max(float(np.linalg.eigvalsh(_tensor(body.sip.of(name)))[0]), 0.0)
+        eps = RELATIVE_EPS * max(float(np.linalg.eigvalsh(inertia_tensor(body.sip.of(name)[4:]))[0]), 0.0)
         rows.append(wide)
         level.append(np.concatenate([np.zeros(7), np.full(DIRECTIONS, eps)]))
     return np.concatenate(rows), np.concatenate(level)

@@ -39,11 +39,8 @@ class FootAcross(Observer):
         """Return three observations of each walking step, the early one only where the heel came down first, on one
         plate alone; one of each running step.
         """
-        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
-
-    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         ways = ((ACROSS_PHASES, False), (_RUNNING, True))
-        return [one for way in ways for one in self._phases(seen, step, *way)]
+        return tuple(one for step in seen.steps for way in ways for one in self._phases(seen, step, *way))
 
     def _phases(
         self, seen: SeenTrial, step: FootStep, phases: Mapping[str, tuple[float, ...]], running: bool

@@ -232,8 +232,8 @@ def _found(search: LoadSearch) -> str:
     best = search.best
     x, y, z = (f"{1000 * value:.0f}" for value in best.place)
     several = len(search.segments) > 1
-    if_there = f" if it is on the {_words(best.segment)}" if several else ""
-    other = f" (there the {_words(search.lies_on)} is nearer)" if search.lies_on not in ("", best.segment) else ""
+    if_there = f" if it is on the {spaced(best.segment)}" if several else ""
+    other = f" (there the {spaced(search.lies_on)} is nearer)" if search.lies_on not in ("", best.segment) else ""
     apart = " The segments are known together, not apart: what the plates measured fits a load on each." * several
     return (
         f"Beyond {search.reference} the subject carries {size_and_segments(search)}. Its centre{if_there} is {x}, "
@@ -256,7 +256,7 @@ def size_and_segments(search: LoadSearch) -> str:
 
 def _segments(search: LoadSearch) -> str:
     """Return the segments that may carry the load, most probable first; beyond three the others are counted."""
-    first, *others = map(_words, search.segments)
+    first, *others = map(spaced, search.segments)
     if not others:
         return first
     if len(others) > 2:
@@ -270,8 +270,8 @@ def _none(search: LoadSearch) -> str:
     (low, easy), (high, hard) = sizes[0], sizes[-1]
     return (
         f"No load is found beyond {search.reference} (probability of no load {search.p_no_load:.2f}). The smallest "
-        f"that this session would find in half of the cases: {low:.1f} kg ({_words(easy)}) to {high:.1f} kg "
-        f"({_words(hard)})."
+        f"that this session would find in half of the cases: {low:.1f} kg ({spaced(easy)}) to {high:.1f} kg "
+        f"({spaced(hard)})."
     )
 
 
@@ -282,7 +282,3 @@ def _unclear(search: LoadSearch) -> str:
         f"{size_and_segments(search)}; this session finds {search.best.smallest:.1f} kg there in half of the "
         f"cases.{advice}"
     )
-
-
-def _words(segment: str) -> str:
-    return spaced(segment)

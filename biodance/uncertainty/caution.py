@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import block_diag
 
-from biodance.body.parts import TENSOR, JointError
+from biodance.body.parts import TENSOR, JointError, inertia_tensor
 from biodance.body.tables.choice import BASE, PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.body.tables.segment_data import read_segment_table
@@ -198,10 +198,7 @@ def _averaged(segment: str) -> float:
 
 def _turn_slope(phi: Array) -> Array:
     """Return d phi / d rho (10, 3) for a turn of the matter by rho (3,) rad."""
-    inertia = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        inertia[i, j] = inertia[j, i] = value
-    out = np.zeros((10, 3))
+    inertia, out = inertia_tensor(phi[4:]), np.zeros((10, 3))
     for axis, S in enumerate(skew(np.eye(3))):
         # dh = rho x h, and dI = S I + I S' = S I - I S with S = [rho]x.
         out[1:4, axis] = S @ phi[1:4]

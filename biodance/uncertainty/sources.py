@@ -28,30 +28,39 @@ from biodance.uncertainty.response import ErrorSource, Response, in_segments, me
 
 
 @dataclass(frozen=True, eq=False)
-class _Carried(ErrorSource):
+class _Moved(ErrorSource):
+    """Errors by which the model's markers lie elsewhere, some of them by each."""
+
+    @abstractmethod
+    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
+        """Yield how the model's markers move by each error or kind of errors, (F, R, P) m, and their rows among 3M."""
+
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals of the coordinates that follow the markers."""
+        found = [trial.of_markers(moved, rows) for moved, rows in self._moved(trial)]
+        return np.concatenate(found or [np.empty((len(trial.place), 9, 0))], axis=2)
+
+    def residual(self, trial: Response) -> Array:
+        """Return the residuals of the markers that lie elsewhere."""
+        return np.asarray(in_segments(trial, trial.left(*self._moved(trial))).mean(axis=0))
+
+    def squares(self, trial: Response) -> Array:
+        """Return the squared residuals of the markers that lie elsewhere."""
+        return mean_squares(trial.left(*self._moved(trial)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Carried(_Moved):
     """Errors of joints that displace what hangs on them: segments, and their markers with them."""
 
     @abstractmethod
     def _own(self, trial: Response) -> Iterator[Array]:
         """Yield joint by joint the functionals (F, 9, P) of the segments that hang on it."""
 
-    @abstractmethod
-    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
-        """Yield joint by joint how the model's markers that hang on it move, (F, R, P) m, and their rows among 3M."""
-
     def functional(self, trial: Response) -> Array:
         """Return the functionals of the segments, and of the coordinates that follow their markers."""
-        parts = zip(self._own(trial), self._moved(trial), strict=True)
-        found = [own + trial.of_markers(moved, rows) for own, (moved, rows) in parts]
-        return np.concatenate(found or [np.empty((len(trial.place), 9, 0))], axis=2)
-
-    def residual(self, trial: Response) -> Array:
-        """Return the residuals of the markers that are carried along."""
-        return np.asarray(in_segments(trial, trial.left(*self._moved(trial))).mean(axis=0))
-
-    def squares(self, trial: Response) -> Array:
-        """Return the squared residuals of the markers that are carried along."""
-        return mean_squares(trial.left(*self._moved(trial)))
+        followed = super().functional(trial)
+        return followed + np.concatenate([*self._own(trial), np.empty((len(followed), 9, 0))], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +277,7 @@ class Slide(_WithAngles):
 
 
 @dataclass(frozen=True, eq=False)
-class Sag(ErrorSource):
+class Sag(_Moved):
     """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
 
     @cached_property
@@ -276,39 +285,24 @@ class Sag(ErrorSource):
         """Every segment that wears markers."""
         return tuple(f"sag {kind_of(self.body.segments[s])}" for s in self._worn)
 
-    def functional(self, trial: Response) -> Array:
-        """Return the functionals of the markers that are left behind by the acceleration of their middle."""
-        return np.concatenate([trial.of_markers(*self._moved(trial, s)) for s in self._worn], axis=2)
-
-    def residual(self, trial: Response) -> Array:
-        """Return the residuals of the markers left behind."""
-        return np.asarray(in_segments(trial, self._left(trial)).mean(axis=0))
-
-    def squares(self, trial: Response) -> Array:
-        """Return the squared residuals of the markers left behind."""
-        return mean_squares(self._left(trial))
-
-    def _left(self, trial: Response) -> Array:
-        """Return what is left of the markers (F, 3M, K) m."""
-        return trial.left(*(self._moved(trial, s) for s in self._worn))
-
     @property
     def _worn(self) -> tuple[int, ...]:
         return tuple(sorted(set(self.body.markers.segment)))
 
-    def _moved(self, trial: Response, s: int) -> tuple[Array, Index]:
-        """Return the acceleration (F, R, 1) less gravity, lab, of the middle of a segment's markers, for each of their
-        rows (R,) among 3M.
+    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
+        """Yield the acceleration (F, R, 1) less gravity, lab, of the middle of a segment's markers, for each of their
+        rows (R,) among 3M: by that they are left behind.
         """
-        on = np.flatnonzero(np.array(self.body.markers.segment) == s)
         move = trial.segments
-        # Middle of the markers: its acceleration is that of the origin + dw x r + w x (w x r).
-        arm = move.rotation[:, s] @ self.body.markers.position[on].mean(axis=0)
-        w = move.angular_velocity[:, s]
-        acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
-        # a - g: at rest +9.81 upwards, so the measured marker hangs below the model's by s times that.
-        left_behind = np.tile(acceleration - self.body.gravity, (1, on.size))[:, :, None]
-        return left_behind, (3 * on[:, None] + np.arange(3)).ravel()
+        for s in self._worn:
+            on = np.flatnonzero(np.array(self.body.markers.segment) == s)
+            # Middle of the markers: its acceleration is that of the origin + dw x r + w x (w x r).
+            arm = move.rotation[:, s] @ self.body.markers.position[on].mean(axis=0)
+            w = move.angular_velocity[:, s]
+            turning = cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
+            # a - g: at rest +9.81 upwards, so the measured marker hangs below the model's by s times that.
+            acceleration = move.acceleration[:, s] + turning - self.body.gravity
+            yield np.tile(acceleration, (1, on.size))[:, :, None], (3 * on[:, None] + np.arange(3)).ravel()
 
 
 @dataclass(frozen=True, eq=False)
