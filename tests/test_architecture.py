@@ -112,6 +112,8 @@ ONE_ALGORITHM = {
     "pipeline/movement.py": "what moved in a visit, and what of it the person measured is told",
     "pipeline/still.py": "what is drawn of a body, an instant or a whole session",
     "report/write.py": "what is written of a session, and the paragraph on its methods",
+    "report/figures/session.py": "what is drawn of a session's trials and of their repetitions",
+    "report/tables/session.py": "a session's results, declared once, as a document and as tables",
     "uncertainty/session_noise.py": "the noise of cameras, plates and skin, by what a session itself shows",
     "uncertainty/sources.py": "every elementary error of a person, forward and transpose",
     "settings.py": "every choice with its unit, range and meaning",

@@ -32,7 +32,6 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
-from biodance.report.tables.frames import write_session_tables
 from biodance.report.tables.identification import CORRECTED_ROW, identification_document
 from biodance.report.tables.schema import Row, plain_values
 from biodance.report.tables.session import (
@@ -40,6 +39,7 @@ from biodance.report.tables.session import (
     gait_document,
     movement_document,
     results_document,
+    write_session_tables,
 )
 from biodance.report.wording import format_number
 
