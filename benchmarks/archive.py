@@ -35,7 +35,7 @@ from biodance.batch.run import LEDGER
 from biodance.batch.summary import SESSIONS
 from biodance.batch.work import OUTCOME
 from biodance.errors import BiodanceError
-from biodance.pipeline.plates import judge_plates
+from biodance.pipeline.learn import judge_plates
 from biodance.virtual_lab.causes import fault_of, parse_cause
 from biodance.virtual_lab.visit import Fault, Recording
 

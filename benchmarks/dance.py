@@ -35,7 +35,7 @@ from biodance.dance.problem.plan import read_plan
 from biodance.errors import BiodanceError
 from biodance.library import folder as shipped
 from biodance.pipeline.diagnosis import as_diagnosed, diagnosed_and_corrected
-from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.movement import account_for
 from biodance.records import Subject
 from biodance.report.pages.feedback import write_feedback
 

@@ -17,13 +17,12 @@ import numpy as np
 
 from benchmarks.people import Row, first_seed, kept, run_foreign, subject_of
 from biodance.body.body import Body
-from biodance.identification.added_mass import LoadSearch, added_mass
+from biodance.identification.added_mass import LoadSearch, added_mass, scaled_to_mass
 from biodance.identification.identification import identify_body
 from biodance.identification.statistics import Fit
-from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
-from biodance.pipeline.trial_result import trial_fit
+from biodance.pipeline.trial import trial_fit
 from biodance.virtual_lab.causes import hide, parse_cause
 from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session

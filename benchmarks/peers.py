@@ -25,7 +25,7 @@ from biodance.identification.paper_programme import paper_programme
 from biodance.identification.statistics import Fit
 from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion, Subject, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 from biodance.virtual_lab.person import of_parameters, parameters_of_inertia, place_inertia
 
 SUBJECTS = (Subject(52.0, 1.58, "F"), Subject(66.0, 1.71, "F"), Subject(78.0, 1.80, "M"), Subject(97.0, 1.88, "M"))

@@ -26,7 +26,7 @@ from benchmarks.walks import copied
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, placed
-from biodance.pipeline.plates import judge_plates
+from biodance.pipeline.learn import judge_plates
 
 PLATES = ("plate1", "plate2")
 ACROSS, ALONG, ONSET, WEIGHED, EMPTY = 0.0027, 0.0044, 0.005, 0.001, 0.1

@@ -51,11 +51,11 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
+    from biodance.pipeline.learn import judge_plates as judge_plates
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.live import stream_recording as stream_recording
     from biodance.pipeline.movement import SessionMovement as SessionMovement
     from biodance.pipeline.movement import describe_movement as describe_movement
-    from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
@@ -90,10 +90,9 @@ HOMES = {
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify", "register"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
-    "pipeline.learn": ("learn_laboratory",),
+    "pipeline.learn": ("judge_plates", "learn_laboratory"),
     "pipeline.live": ("stream_recording",),
     "pipeline.movement": ("SessionMovement", "describe_movement"),
-    "pipeline.plates": ("judge_plates",),
     "pipeline.results": ("SessionDiagnosis", "SessionResult"),
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),

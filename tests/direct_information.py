@@ -3,10 +3,10 @@
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.information import Information, fold
+from biodance.identification.posterior import Information, fold
 from biodance.motion.dynamics import regressor
 from biodance.records import Motion, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 
 def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise) -> Information:

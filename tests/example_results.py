@@ -14,16 +14,8 @@ from biodance.lab.markers.signals import MarkerGaps
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.saved_results import provenance
-from biodance.pipeline.trial_result import (
-    Check,
-    MarkerFit,
-    Step,
-    Still,
-    TrialResult,
-    WeighedBy,
-    Weighing,
-    WrenchComparison,
-)
+from biodance.pipeline.still import Still
+from biodance.pipeline.trial import Check, MarkerFit, Step, TrialResult, WeighedBy, Weighing, WrenchComparison
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 from biodance.report.pages.session import page
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.identification.added_mass import LoadCandidate, LoadSearch
-from biodance.identification.load_posterior import MASSES, LoadPosterior
+from biodance.identification.added_mass import MASSES, LoadCandidate, LoadPosterior, LoadSearch
 
 PLACE = np.array([0.01, -0.12, 0.02])
 NOTHING = Diagnosis(True, ())

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.body.human.human import human
+from biodance.identification.added_mass import scaled_to_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.loads import compact_load
-from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.motion.dynamics import compare, predict_wrench
 from biodance.pipeline.identification import identify_trials
 from biodance.pipeline.results import Placed, SessionResult
-from biodance.pipeline.trial_result import TrialResult, WrenchComparison, trial_fit
+from biodance.pipeline.trial import TrialResult, WrenchComparison, trial_fit
 from biodance.records import Motion, Session, Source, Subject, Trial, Wrench
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")

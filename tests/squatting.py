@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.human.human import human
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import Motion, Plate, Source, Subject, Trial, Wrench
 
 BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))

@@ -17,7 +17,7 @@ from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, plate_places
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
-from biodance.pipeline.plates import judge_plates
+from biodance.pipeline.learn import judge_plates
 from biodance.report.laboratory import QUANTITY_TITLES, plate_figure
 
 WEIGHT = 600.0

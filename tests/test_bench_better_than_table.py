@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.people import better, better_than_table, expected_better
-from biodance.identification.information import Information
-from biodance.identification.posterior import find_posterior
+from biodance.identification.posterior import Information, find_posterior
 from biodance.records import Sip
 from biodance.spatial import point_mass
 

@@ -12,7 +12,7 @@ from lab_sessions import person, plate
 from biodance.body.human.human import human
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.program_folders import write_bids_folder
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import Motion, Session, Source, Subject, Trial
 
 SUBJECT = Subject(62.0, 1.70, "F", name="S 01")

@@ -72,7 +72,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     wrench = predict_wrench(ADULT, motion)
     noise = typical_noise(wrench)
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
-    data = statistics(ADULT, fit, noise).information(noise)
+    data = statistics(ADULT, (fit,), noise).information(noise)
     posterior = find_posterior(temper(data, mismatch(ADULT, (fit,), noise), typical_sizes()), widened_prior(ADULT.sip))
     found = expected_spread(ADULT, motion, np.array([6.0]))
     for i in range(12):

@@ -36,7 +36,7 @@ from biodance.identification.base_parameters import estimate_base, structural_ba
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.pipeline.dance import robot_dancer
 from biodance.records import Subject, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 HOAP = standing_frames(hoap3())
 PROTOCOL = 'name = "tiny"\nmove_s = 2.0\nhold_s = 1.0\n[postures]\nparallel = 1\nsingle_left = 1\n'

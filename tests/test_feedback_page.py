@@ -28,8 +28,7 @@ from biodance.report.pages import feedback
 from biodance.report.pages.feedback import follow_scene, scene_of, write_feedback
 from biodance.report.tables.identification import VISIT_ROW, log_in_words
 from biodance.spatial import wrench_shift
-from biodance.uncertainty.bands import Bands
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Bands, Noise
 
 
 @pytest.fixture(scope="module")

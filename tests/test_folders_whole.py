@@ -28,7 +28,7 @@ from biodance.lab.plain_text import write_whole
 from biodance.lab.session.results_folder import check_results, file_hash, results_folder, whole_folder
 from biodance.pipeline.accepted import CORRECTED, write_corrected
 from biodance.pipeline.program_folders import write_bids_folder, write_opensim_folder
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import Motion, Session, Source, Subject, Trial
 from biodance.registration import write_registered
 from biodance.report.files import tables_folder, write_files, write_tables

@@ -6,15 +6,20 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass
+from biodance.identification.added_mass import (
+    MASSES,
+    LoadCandidate,
+    LoadPosterior,
+    LoadSearch,
+    added_mass,
+    whiten_innovation,
+)
 from biodance.identification.identification import Identification, identify_body
-from biodance.identification.learning import learn_noise
-from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.loads import compact_load, load_moments, unknown_loads, with_room
-from biodance.identification.statistics import layout_for, standing_point, statistics
-from biodance.identification.unloaded_body import whiten_innovation
+from biodance.identification.statistics import learn_noise, standing_point, statistics
 from biodance.records import Sip
 from biodance.spatial import point_mass
+from biodance.uncertainty.bands import Noise
 
 PLACE = np.array([0.15, -0.2, 0.2])
 
@@ -83,7 +88,7 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
         loaded = truth.copy()
         loaded[10:20] += mass * compact_load(PLACE)
         fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
-        data = statistics(body, fit, layout_for(standing_point((fit,))))
+        data = statistics(body, (fit,), Noise.unit(standing_point((fit,))))
         slow.append(
             [
                 learn_noise(data, prior).covariance[0][2, 2]

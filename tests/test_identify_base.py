@@ -7,7 +7,7 @@ from random_bodies import random_body, random_motion
 
 from biodance.identification.base_parameters import estimate_base, structural_base
 from biodance.motion.dynamics import predict_wrench, regressor
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -9,17 +9,15 @@ from identify_trials import smooth_motion
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.body.human.human import human
-from biodance.identification.calibration import gains_move_masses, undiluted
 from biodance.identification.identification import identify_body
-from biodance.identification.information import Information
 from biodance.identification.loads import compact_load
-from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import PAIRS, Fit, Statistics, layout_for, statistics
+from biodance.identification.mismatch import gains_move_masses, undiluted
+from biodance.identification.posterior import Information, find_posterior
+from biodance.identification.statistics import PAIRS, Fit, Statistics, statistics
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
-from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.caution import widened_prior
-from biodance.uncertainty.noise import Noise
 
 BODY = human(Subject(70.0, 1.75, "M"))
 ABOUT = np.zeros(3)
@@ -41,7 +39,7 @@ def recorded(shake: float, noise_n: float = 1.0) -> Statistics:
     seen[:, trunk] += shake * noise / noise.std()
     motion = Motion(real.time, real.q, real.v, seen)
     fit = Fit("t", motion, Wrench(real.time, wrench), np.ones(3000, dtype=bool))
-    return statistics(BODY, fit, layout_for(ABOUT))
+    return statistics(BODY, (fit,), Noise.unit(ABOUT))
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +139,7 @@ def test_statistics_without_their_fastest_band_are_those_of_fewer_bands(shaken: 
 def test_a_band_that_only_noise_fills_is_left_out_and_said(slow: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     real = smooth_motion(BODY, np.random.default_rng(3), frames=400, size=0.3)
     fit = Fit("t", real, predict_wrench(BODY, real), np.ones(400, dtype=bool))
-    monkeypatch.setattr("biodance.identification.calibration.gains_move_masses", lambda *_: slow)
+    monkeypatch.setattr("biodance.identification.mismatch.gains_move_masses", lambda *_: slow)
     found = identify_body(BODY, (fit,))
     assert found.diluted is slow
     assert found.noise.bands.edges[-1] == (2.5 if slow else 6.0)
@@ -160,7 +158,7 @@ def test_gains_are_measured_under_the_load_that_the_data_show(monkeypatch: pytes
         seen.append(phi[arm] - BODY.sip.phi[arm])
         return undiluted(total, phi, known, table)
 
-    monkeypatch.setattr("biodance.identification.calibration.undiluted", watched)
+    monkeypatch.setattr("biodance.identification.mismatch.undiluted", watched)
     posterior = identify_body(BODY, (fit,)).posterior
     kept = posterior.mean[arm] - BODY.sip.phi[arm]
     assert kept < 1.0, "the table keeps most of it from the arm"

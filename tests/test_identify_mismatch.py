@@ -10,7 +10,6 @@ from biodance.body.human.human import human
 from biodance.body.human.skeleton import with_optional
 from biodance.body.parts import JointError, shift_matter
 from biodance.body.tables.error_sizes import error_size
-from biodance.identification.information import Information
 from biodance.identification.mismatch import (
     Mismatch,
     Sizes,
@@ -20,15 +19,13 @@ from biodance.identification.mismatch import (
     share_errors,
     temper,
 )
-from biodance.identification.posterior import find_posterior
-from biodance.identification.statistics import layout_for, statistics
+from biodance.identification.posterior import Information, find_posterior
+from biodance.identification.statistics import statistics
 from biodance.motion.kinematics import chains, jacobian, neighbours, poses
 from biodance.records import CHANNELS, Subject
-from biodance.uncertainty.bands import Bands
-from biodance.uncertainty.joints import joint_of
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Bands, Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, around_zero, plate_sources
-from biodance.uncertainty.sources import deviations, of_markers
+from biodance.uncertainty.sources import deviations, joint_of, of_markers
 
 BANDS = Bands((0.0, 1.0, 10.0), 25.0)
 
@@ -180,8 +177,8 @@ def test_a_heavy_head_that_nods_does_not_make_a_heavy_trunk() -> None:
     )
     heavy = replace(body, parts=(replace(head, share=1.3 * head.share),))
     fit = noisy_fit(heavy, smooth_motion(body, rng, frames=600, size=0.3), body.sip.phi, rng)
-    noise = layout_for(np.zeros(3))
-    total = statistics(body, fit, noise)
+    noise = Noise.unit(np.zeros(3))
+    total = statistics(body, (fit,), noise)
     noise = replace(noise, covariance=noise.covariance * np.outer([2.0] * 3 + [0.5] * 3, [2.0] * 3 + [0.5] * 3))
     found = mismatch(body, (fit,), noise)
     off = [

@@ -5,8 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from biodance.errors import BiodanceError
-from biodance.uncertainty.bands import BLOCK_SAMPLES, WHITE, Bands
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import BLOCK_SAMPLES, WHITE, Bands, Noise
 
 ABOUT = np.array([0.2, -0.1, 0.0])
 

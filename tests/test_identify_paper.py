@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from biodance.identification.paper_programme import _solve, directions, inequalities, paper_programme
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 UNIT = Noise.of_sd(1.0, 1.0, np.zeros(3))
 

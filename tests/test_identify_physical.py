@@ -13,12 +13,11 @@ from random_bodies import random_body, random_motion
 from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import NotSolved
 from biodance.identification import physical
-from biodance.identification.information import Information, fold
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.posterior import BodyPosterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, Information, find_posterior, fold
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Sip, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
 SEEDS = range(100)

@@ -9,15 +9,15 @@ from joint_cases import displaced, hidden, scaling
 
 from biodance.body.body import Body, body_text, parse_body
 from biodance.body.parts import JointError, rigid_inertia
-from biodance.identification.information import Information
 from biodance.identification.knowledge import known_together
-from biodance.identification.placement import (
+from biodance.identification.loads import (
     matter_follows_joint,
     more_probable_table,
     possible_tables,
     with_matter_placed,
     with_sides,
 )
+from biodance.identification.posterior import Information
 from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
 from biodance.records import Sip
 from biodance.uncertainty.caution import from_true_centres, misplaced, widened_prior

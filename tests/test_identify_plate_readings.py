@@ -11,12 +11,12 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.body.human.human import human
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.mismatch import mismatch
-from biodance.identification.plate_readings import PlateReadings, plate_readings
-from biodance.identification.statistics import Fit, layout_for, statistics
-from biodance.identification.validation import validate
+from biodance.identification.statistics import Fit, statistics
+from biodance.identification.validation import PlateReadings, plate_readings, validate
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import _on_fitted_plates
 from biodance.records import Subject, Wrench
+from biodance.uncertainty.bands import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, SOURCES, plate_errors, plate_sources
 
 WRONG = {"Fz->Fx": 2.0, "Fz->My": -1.5, "Mz": 2.0}
@@ -25,7 +25,7 @@ WRONG = {"Fz->Fx": 2.0, "Fz->My": -1.5, "Mz": 2.0}
 
 def _trial(fit: Fit, size: np.ndarray) -> Fit:
     """Return a trial of which the plates err by ``size`` (49,) about the lab origin."""
-    rows = plate_errors(fit.wrench.value, fit.motion.rate, layout_for(np.zeros(3)), plate_sources())
+    rows = plate_errors(fit.wrench.value, fit.motion.rate, Noise.unit(np.zeros(3)), plate_sources())
     return replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value + rows @ size))
 
 
@@ -133,7 +133,7 @@ def test_of_plates_on_which_no_fitted_trial_stands_nothing_is_told() -> None:
 def test_the_rows_are_those_of_the_scores() -> None:
     body, truth, rng = person(8)
     fit = noisy_fit(body, smooth_motion(body, rng, frames=800), truth, rng)
-    noise, p = layout_for(np.array([0.1, 0.2, 0.0])), 10 * len(body.segments)
+    noise, p = Noise.unit(np.array([0.1, 0.2, 0.0])), 10 * len(body.segments)
     found = mismatch(body, (fit,), noise, with_rows=True)
     plain = mismatch(body, (fit,), noise)
     assert plain.rows is None
@@ -144,6 +144,6 @@ def test_the_rows_are_those_of_the_scores() -> None:
     np.testing.assert_allclose(found.rows.kinematics[:p], found.kinematics, rtol=1e-9)
     scale = np.abs(found.rows.normal).max()
     np.testing.assert_allclose(found.rows.normal, found.rows.normal.T, atol=1e-9 * scale)
-    whole = statistics(body, fit, noise).normal_matrix(noise)
+    whole = statistics(body, (fit,), noise).normal_matrix(noise)
     np.testing.assert_allclose(found.rows.normal[:p, :p], whole[:p, :p], rtol=1e-6, atol=1e-9 * np.abs(whole).max())
     np.testing.assert_allclose(found.rows.target[:p], whole[:p, p], rtol=1e-6, atol=1e-9 * np.abs(whole).max())

@@ -12,7 +12,7 @@ from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import find_posterior, mean_and_covariance
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.records import Sip, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 
 NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
 

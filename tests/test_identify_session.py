@@ -10,13 +10,13 @@ from biodance.body.parts import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import NOISE_ALONE, conclude, identify_body
 from biodance.identification.knowledge import knowledge, segment_quantities
-from biodance.identification.learning import learn_noise
 from biodance.identification.loads import compact_load, unknown_loads, with_room
 from biodance.identification.sessions import differences
-from biodance.identification.statistics import layout_for, standing_point, statistics
+from biodance.identification.statistics import learn_noise, standing_point, statistics
 from biodance.identification.validation import residual_ratio, validate
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Sip, Wrench
+from biodance.uncertainty.bands import Noise
 from biodance.uncertainty.caution import about_true_centres, widened_prior
 
 
@@ -73,8 +73,8 @@ def test_sway_that_may_be_skin_moves_no_mass(size: float, believed: bool) -> Non
 
 def test_statistics_alone_say_that_their_intervals_are_short() -> None:
     body, _, fits = session(1, frames=600)
-    layout = layout_for(standing_point(fits))
-    found = conclude(body, statistics(body, fits[0], layout), ("t",))
+    layout = Noise.unit(standing_point(fits))
+    found = conclude(body, statistics(body, (fits[0],), layout), ("t",))
     assert NOISE_ALONE in found.notes
 
 
@@ -206,7 +206,7 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
 
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
-    total = statistics(body, fits[0], layout_for(standing_point(fits)))
+    total = statistics(body, (fits[0],), Noise.unit(standing_point(fits)))
     noise = learn_noise(total, with_room(widened_prior(body.sip), unknown_loads(body)))
     np.testing.assert_allclose(
         conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi

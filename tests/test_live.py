@@ -18,7 +18,7 @@ from biodance.cli.shared import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
-from biodance.identification.recursive import initial_posterior
+from biodance.identification.knowledge import initial_posterior
 from biodance.motion.kinematics import poses
 from biodance.pipeline.live import LiveSession, LiveState, StreamWatch, body_and_stream, replay
 from biodance.pipeline.still import asked_posture, asked_words

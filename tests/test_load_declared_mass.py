@@ -5,12 +5,11 @@ from dataclasses import replace
 import pytest
 from identified_sessions import body, declared, session_result
 
-from biodance.identification.added_mass import added_mass
+from biodance.identification.added_mass import added_mass, scaled_to_mass
 from biodance.identification.sessions import differences
-from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.pipeline.identification import SessionIdentification, identify_trials, load_doubts
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial import Check
 from biodance.report.tables.identification import identification_document
 
 LOAD = 2.4

@@ -4,10 +4,18 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from biodance.identification.added_mass import LoadCandidate, LoadSearch
-from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
-from biodance.identification.load_words import say_load
-from biodance.identification.unloaded_body import inflate_prior, scaled_to_mass, unloaded_bodies
+from biodance.identification.added_mass import (
+    MASSES,
+    LoadCandidate,
+    LoadPosterior,
+    LoadSearch,
+    LoadView,
+    inflate_prior,
+    log_mass_prior,
+    scaled_to_mass,
+    unloaded_bodies,
+)
+from biodance.pipeline.words import say_load
 from biodance.records import Sip
 
 NAN = np.full(3, np.nan)

@@ -10,13 +10,12 @@ from identified_sessions import session_result
 
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.effects.added_mass import AddedMass
-from biodance.identification.load_words import say_load
 from biodance.identification.loads import nearest_segment
 from biodance.motion.kinematics import poses
 from biodance.pipeline.diagnosis import with_load, with_weighed_load
 from biodance.pipeline.results import SessionDiagnosis
-from biodance.pipeline.trial_result import Check
-from biodance.pipeline.words import alternatives, in_words
+from biodance.pipeline.trial import Check
+from biodance.pipeline.words import alternatives, in_words, say_load
 from biodance.report.tables.diagnosis import diagnosis_document
 from biodance.report.tables.identification import added_mass_document
 from biodance.report.wording import sizes_in_words

@@ -10,7 +10,7 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.program_tables import read_mot
 from biodance.lab.readers.mot import plates_of
 from biodance.pipeline.program_folders import write_opensim_folder
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 
 
 @pytest.fixture(scope="module")

@@ -24,8 +24,8 @@ from biodance.dance.problem.plan import read_plan
 from biodance.diagnosis.archive.judge import judge_archive
 from biodance.lab.session.read import read_session
 from biodance.pipeline.dance import DanceResult
-from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.plates import PlatesJudged
+from biodance.pipeline.learn import PlatesJudged
+from biodance.pipeline.movement import account_for
 from biodance.pipeline.session import examine, identification_of
 from biodance.report.dance import cards_page
 from biodance.report.laboratory import plates_document, plates_page

@@ -16,8 +16,7 @@ from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.newton import QuietStanding, facing, quiet_standing
 from biodance.pipeline.identification import mass_check, standing_check, trial_checks
 from biodance.pipeline.still import bone_lines
-from biodance.pipeline.trial import attempt, marker_fit
-from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WeighedBy, Weighing
+from biodance.pipeline.trial import MarkerFit, Step, TrialResult, WeighedBy, Weighing, attempt, marker_fit
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
 from biodance.settings import CheckLimits
 

@@ -13,13 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.solids import shape_parts
 from biodance.child_process import run_python
-from biodance.identification.added_mass import added_mass
-from biodance.identification.load_posterior import MASSES, LoadPosterior
+from biodance.identification.added_mass import MASSES, LoadPosterior, added_mass
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.pipeline.replay import replay_scene
 from biodance.pipeline.results import Placed
-from biodance.pipeline.still import load_still, posture_still, worst_still
+from biodance.pipeline.still import load_still, posture_still, replay_scene, worst_still
 from biodance.records import Markers
 from biodance.records.motion import BY_FRAME
 from biodance.report.figures import solid
@@ -171,7 +169,7 @@ def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
 
 
 def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypatch):
-    monkeypatch.setattr("biodance.pipeline.replay._FRAMES", 40)
+    monkeypatch.setattr("biodance.pipeline.still._FRAMES", 40)
     search, place = result.identification.search, np.array([0.0, -0.2, 0.02])
     best = replace(search.best, segment="left_forearm_hand", place=place)
     found = replace(result.identification, search=replace(search, suspects=(best, *search.suspects[1:])))

@@ -10,7 +10,7 @@ from target import target
 
 from biodance.errors import UnknownName
 from biodance.identification.base_parameters import structural_base
-from biodance.identification.information import fold
+from biodance.identification.posterior import fold
 from biodance.motion.dynamics import regressor
 
 BODY = random_body(np.random.default_rng(0), n_segments=3)

@@ -19,7 +19,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.saved_results import provenance
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial import Check
 from biodance.records.attention import Attention, Doubt, Judged, WrongWeight, told_together
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page

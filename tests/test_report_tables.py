@@ -16,7 +16,7 @@ from biodance.diagnosis.gain import Gain
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import describe_movement
 from biodance.report.files import tables_folder, write_tables
-from biodance.report.tables.frames import session_tables
+from biodance.report.tables.session import session_tables
 
 GAIN = Gain(np.ones(6), np.full(6, 0.8), (0.1, 0.3), ("squat_1",))
 DIAGNOSIS = Diagnosis(

@@ -9,14 +9,14 @@ from example_results import full_session, html_of
 from found_loads import GAIN, NOTHING, OWN, found
 from identified_sessions import session_result
 
-from biodance.identification.load_words import say_load
 from biodance.pipeline.diagnosis import as_diagnosed
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial import Check
+from biodance.pipeline.words import say_load
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.vector import round_ticks
-from biodance.report.methods import CLAUSES, REFERENCES, methods_text
 from biodance.report.pages.movement import _beside
 from biodance.report.wording import causes_by_effect, changed, moment, share_of, signed, size_seen, sized
+from biodance.report.write import CLAUSES, REFERENCES, methods_text
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from squatting import BODY, TIME, squat
 from biodance.errors import FileRefused, MissingLibrary, TrialRefused
 from biodance.motion.kinematics import poses
 from biodance.pipeline.export import write_rerun
-from biodance.pipeline.trial_result import WrenchComparison
+from biodance.pipeline.trial import WrenchComparison
 
 
 class Columns(SimpleNamespace):

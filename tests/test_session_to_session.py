@@ -22,7 +22,7 @@ from biodance.pipeline.body import starting_from
 from biodance.pipeline.front_dance import virtual_subject
 from biodance.pipeline.results import MendedCopy, SessionDiagnosis
 from biodance.pipeline.saved_results import known_body
-from biodance.pipeline.trial_result import trial_fit
+from biodance.pipeline.trial import trial_fit
 from biodance.records import Session, Subject
 from biodance.report.write import _accepted
 

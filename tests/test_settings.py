@@ -250,7 +250,7 @@ def test_every_rule_of_contact_is_asked_for_where_contact_is_found(usual):
 
 def test_an_outlier_is_what_the_analyst_says(usual):
     from biodance.identification.statistics import believable
-    from biodance.pipeline.trial_result import trial_fit
+    from biodance.pipeline.trial import trial_fit
 
     strict = replace(usual["squat_1"], trial=replace(usual["squat_1"].trial, settings=USUAL.changed({"outlier": 0.05})))
     counts = [believable(usual.body, trial_fit(one), np.zeros(3))[0].use.sum() for one in (usual["squat_1"], strict)]

@@ -9,10 +9,10 @@ import pytest
 from diagnosed_sessions import RATE, body, windows
 
 from biodance.diagnosis.problem import TrialWindow, problem
-from biodance.identification.statistics import layout_for, statistics
+from biodance.identification.statistics import statistics
 from biodance.lab.prepare import LowPass, low_pass
 from biodance.records import Wrench
-from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.bands import BANDS, Noise
 
 SLOW = 2.0
 """Hz of the one trial's cut-off."""
@@ -54,8 +54,8 @@ def test_what_a_trials_own_low_pass_has_taken_out_is_not_looked_at(trials: tuple
 
 def test_identification_counts_no_rows_that_the_low_pass_has_taken_out(trials: tuple[TrialWindow, ...]) -> None:
     """The covariance that the body's residuals show of a band is that of the trial which holds it."""
-    layout, phi = layout_for(np.array([0.4, 0.2, 0.0])), body().sip.phi
-    whole, slow = (statistics(body(), window.fit, layout) for window in trials)
+    layout, phi = Noise.unit(np.array([0.4, 0.2, 0.0]), BANDS), body().sip.phi
+    whole, slow = (statistics(body(), (window.fit,), layout) for window in trials)
     assert whole.count[-1] > 0
     assert slow.count[-1] == 0
     together = (whole + slow).moments(phi, np.zeros((phi.size, phi.size)))

@@ -22,7 +22,7 @@ from biodance.dance.search.known_postures import posture_phrases
 from biodance.errors import FileRefused, UnknownName
 from biodance.lab.session.file import VisitEntry
 from biodance.library import folder, names
-from biodance.pipeline.for_subject import SubjectAccount, account_for
+from biodance.pipeline.movement import SubjectAccount, account_for
 from biodance.report.pages.language import FAMILY, read_language
 from biodance.report.pages.subject import subject_page
 

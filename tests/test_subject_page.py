@@ -14,8 +14,8 @@ from made_cycles import walked_knees
 
 from biodance.cli import run
 from biodance.cli.shared import DONE, NEEDS_A_PERSON
-from biodance.pipeline.for_subject import account_for
-from biodance.pipeline.trial_result import OPEN, Check
+from biodance.pipeline.movement import account_for
+from biodance.pipeline.trial import OPEN, Check
 from biodance.report.pages.language import read_language
 from biodance.report.pages.subject import PLAIN_NAMES, plain_movement, subject_page
 from biodance.uncertainty.tolerances import shipped

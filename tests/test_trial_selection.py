@@ -13,7 +13,7 @@ from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissu
 from biodance.diagnosis.problem import TrialWindow
 from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.judged_trials import chosen_windows, left_out
-from biodance.pipeline.trial_result import Step, TrialResult, WrenchComparison
+from biodance.pipeline.trial import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import shipped

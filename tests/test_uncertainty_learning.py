@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identification.statistics import layout_for, statistics
+from biodance.identification.statistics import statistics
 from biodance.motion.dynamics import regressor
-from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.learning import Moments, floor, maximise, moments_of, noise_of, sizes_of
 
 
 def test_the_expectation_counts_the_spread_of_the_parameters() -> None:
     body, truth, rng = person(0)
     fit = noisy_fit(body, smooth_motion(body, rng, frames=800), truth, rng)
-    layout = layout_for(np.array([0.1, 0.2, 0.0]))
+    layout = Noise.unit(np.array([0.1, 0.2, 0.0]))
     root = 0.05 * rng.normal(size=(truth.size, truth.size))
     covariance, phi = root @ root.T, truth + 0.1 * rng.normal(size=truth.size)
-    found = statistics(body, fit, layout).moments(phi, covariance)
+    found = statistics(body, (fit,), layout).moments(phi, covariance)
     W, expected, count = regressor(body, fit.motion), np.zeros((len(BANDS), 6, 6)), np.zeros(len(BANDS))
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         left = layout.bands.coefficients(layout.shift @ (fit.wrench.value[pick] - W[pick] @ phi)[..., None])[..., 0]

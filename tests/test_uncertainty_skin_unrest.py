@@ -18,8 +18,7 @@ from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Wrench
 from biodance.spatial import wrench_about_origin, wrench_about_point
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import of_marker_errors
-from biodance.uncertainty.skin_unrest import SkinUnrest, skin_unrest
+from biodance.uncertainty.session_noise import SkinUnrest, of_marker_errors, skin_unrest
 
 GENTLE = 0.3
 """Share of the synthetic movement that tracking follows from its own start."""

@@ -17,10 +17,19 @@ from biodance.body.parts import GRAVITY, rigid_inertia
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import chains, neighbours, poses
 from biodance.records import Array, Motion
-from biodance.uncertainty.joints import Centre, Tilt, joint_of
 from biodance.uncertainty.response import ErrorSource, Response, derivatives
-from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
-from biodance.uncertainty.sources import forward, of_clusters, of_markers, transpose
+from biodance.uncertainty.sources import (
+    Centre,
+    Flesh,
+    Sag,
+    Slide,
+    Tilt,
+    forward,
+    joint_of,
+    of_clusters,
+    of_markers,
+    transpose,
+)
 
 SMALL = 1e-4
 FRAMES = 150

@@ -18,9 +18,14 @@ from biodance.body.body import Body
 from biodance.cli import run
 from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
-from biodance.identification.information import Information
-from biodance.identification.limbs import segments_beyond, with_declared_limbs, with_open_limb
-from biodance.identification.placement import more_probable_table, possible_tables
+from biodance.identification.loads import (
+    more_probable_table,
+    possible_tables,
+    segments_beyond,
+    with_declared_limbs,
+    with_open_limb,
+)
+from biodance.identification.posterior import Information
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.accepted import write_corrected

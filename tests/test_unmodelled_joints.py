@@ -12,8 +12,7 @@ from biodance.effects import causes
 from biodance.inference.session import judge, see
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion
-from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.session_noise import of_unseen_joints
 
 ARMS = {"right_shoulder", "right_elbow", "left_shoulder", "left_elbow"}

@@ -22,7 +22,7 @@ from biodance.pipeline.attention import (
 )
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.results import Placed
-from biodance.pipeline.trial_result import Check, Step
+from biodance.pipeline.trial import Check, Step
 from biodance.pipeline.words import in_words
 from biodance.records.attention import Attention, Doubt, Judged, strongest_first
 from biodance.report.tables.diagnosis import ATTENTION_ROW

@@ -20,7 +20,7 @@ from biodance.lab.session.entries import plate_channels
 from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import find_recordings
-from biodance.pipeline.replay import packed_numbers
+from biodance.pipeline.still import packed_numbers
 from biodance.records import ROLES, Markers, Session, Trial, runs
 from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import EVENT_ROW

@@ -332,10 +332,10 @@ def inertial_parameters(lump: RigidInertia) -> Array:
 def rigid_inertia(phi: Array) -> RigidInertia:
     """Return the lump of ten parameters; the inverse of `inertial_parameters` for a positive mass."""
     com = phi[1:4] / phi[0]
-    return RigidInertia(float(phi[0]), com, _tensor(phi[4:]) - phi[0] * _steiner(com))
+    return RigidInertia(float(phi[0]), com, inertia_tensor(phi[4:]) - phi[0] * _steiner(com))
 
 
-def _tensor(moments: Array) -> Array:
+def inertia_tensor(moments: Array) -> Array:
     """Return the tensor (3, 3) of Ixx, Ixy, Iyy, Ixz, Iyz, Izz (6,)."""
     xx, xy, yy, xz, yz, zz = moments
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -404,4 +404,4 @@ def parameter_jacobian(lump: RigidInertia) -> Array:
 
 def lump_from(row: Array) -> RigidInertia:
     """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `primitives_of`."""
-    return RigidInertia(float(row[0]), row[1:4], row[0] * _tensor(row[4:]))
+    return RigidInertia(float(row[0]), row[1:4], row[0] * inertia_tensor(row[4:]))

@@ -70,7 +70,7 @@ def plates_command(
     """
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.plates import judge_plates
+    from biodance.pipeline.learn import judge_plates
     from biodance.report.laboratory import print_plates, write_plates
 
     with shared.progress() as tell:

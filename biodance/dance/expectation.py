@@ -34,19 +34,17 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.visit_log import VisitLog
 from biodance.errors import BiodanceError
-from biodance.identification.information import Information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identification.posterior import BodyPosterior, find_posterior, prior_factor
+from biodance.identification.posterior import BodyPosterior, Information, find_posterior, prior_factor
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Motion, Sip, Wrench
 from biodance.threads import one_thread
-from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.bands import BANDS, Bands, Noise
 from biodance.uncertainty.caution import widened_prior
-from biodance.uncertainty.noise import Noise
 
 JUDGED_RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
@@ -140,7 +138,7 @@ def movement_evidence(
     used = np.ones(few.time.size, dtype=bool) if use is None else use[::step]
     fit = Fit("movement", few, predict_wrench(body, few), used)
     # Upper triangle R of the whitened regressor, R'R its information.
-    triangle = statistics(body, fit, noise).information(noise).triangle
+    triangle = statistics(body, (fit,), noise).information(noise).triangle
     size = len(triangle)
     scores = Mismatch(*np.zeros((2, size, 1))) if robot else mismatch(body, (fit,), noise)
     return MovementEvidence(body, triangle.T @ triangle, scores)

@@ -14,7 +14,7 @@ from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.motion.kinematics import chains
 from biodance.records import Array
-from biodance.uncertainty.joints import joint_of
+from biodance.uncertainty.sources import joint_of
 from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
 
 

@@ -15,15 +15,16 @@ from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import (
+    SkinUnrest,
     added_noise,
     of_marker_errors,
     of_unseen_joints,
     of_zeros,
+    skin_unrest,
     with_movement,
     with_own_noise,
     with_zeros,
 )
-from biodance.uncertainty.skin_unrest import SkinUnrest, skin_unrest
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 _POSTURES = 4

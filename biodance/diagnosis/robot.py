@@ -14,7 +14,6 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.effects import unit_of
-from biodance.identification.learning import WORTH
 from biodance.identification.mismatch import long_runs
 from biodance.identification.posterior import prior_factor
 from biodance.identification.robot import (
@@ -31,15 +30,14 @@ from biodance.identification.robot import (
     robot_start,
     slow_wrench,
 )
-from biodance.identification.statistics import Statistics, empty, layout_for, standing_point
+from biodance.identification.statistics import WORTH, Statistics, empty, standing_point
 from biodance.lab.plates.faults import DELAY, OFFSET
 from biodance.motion.dynamics import regressor
 from biodance.motion.grounded import ground_again
 from biodance.records import Array, Wrench
 from biodance.threads import one_thread
-from biodance.uncertainty.bands import Bands
+from biodance.uncertainty.bands import Bands, Noise
 from biodance.uncertainty.learning import maximise, noise_of
-from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import SOURCES, Plates, plate_errors, plate_sources, source_sizes
 
 AnyMotion = TypeVar("AnyMotion", bound=RobotMotion)
@@ -120,7 +118,7 @@ def _cause_columns(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[Ro
         (*causes, *[None] * len(places)),
         np.append(usual, places),
         np.append(wide, places),
-        layout_for(standing_point(tuple(one.fit for one in fitted)), _BANDS_OF_CAUSES),
+        Noise.unit(standing_point(tuple(one.fit for one in fitted)), _BANDS_OF_CAUSES),
         tuple((int(start), count) for start, count in zip(starts, counts, strict=True)),
     )
 
@@ -184,7 +182,7 @@ def _without(body: Body, one: AnyMotion, columns: _Columns, cause: RobotCause, a
         return replace(one, fit=replace(fit, motion=found.motion), angle=angle, grounded=found)
     plates, k = plate_sources(), columns.causes.index(cause) - len(columns.of_motion)
     fault = Plates(plates.mixing[k : k + 1], plates.offset[k : k + 1], plates.delay[k : k + 1])
-    about = layout_for(standing_point((fit,)))
+    about = Noise.unit(standing_point((fit,)))
     error = plate_errors(slow_wrench(body, one.grounded, one.angle), fit.motion.rate, about, fault)[:, :, 0]
     return replace(one, fit=replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - amount * error)))
 

@@ -16,8 +16,7 @@ from biodance.effects import Case
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import highest_frequency
 from biodance.records import Array, Markers, Motion, Wrench
-from biodance.uncertainty.bands import BANDS, Bands
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import BANDS, Bands, Noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
 _RATE = 50.0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.effects.marker_misplaced import MarkerMisplaced
 from biodance.effects.plate_offset import PlateOffset
-from biodance.identification.recursive import RecursivePosterior
+from biodance.identification.knowledge import RecursivePosterior
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
 

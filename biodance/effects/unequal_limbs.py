@@ -7,7 +7,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import About, CauseWords, CheckKind
-from biodance.identification.limbs import limb_and_rest, segments_beyond, with_open_limb
+from biodance.identification.loads import limb_and_rest, segments_beyond, with_open_limb
 from biodance.lab.markers.sets import other_side
 from biodance.records import Array, Subject
 from biodance.uncertainty.caution import shift_slope

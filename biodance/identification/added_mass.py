@@ -1,11 +1,23 @@
 """Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against
 the table.
 
-The hypotheses are "no load" and "m kg on segment s" (`load_posterior`), under one linear Gaussian model: the body as
-known before (the posterior of the reference session, or the table) plus the load. What was known before may be wrong by
-more than its standard deviations say (another laboratory's people, a table that cuts the trunk elsewhere), and without
-a reference the declared mass may be wrong or include the load: these hypotheses (`unloaded_bodies`) are weighted by
-their evidence together with the load, so that a load is announced only where an odd body cannot do as well.
+The hypotheses are "no load" and "m kg on segment s", under one linear Gaussian model: the body as known before (the
+posterior of the reference session, or the table) plus the load. What was known before may be wrong by more than its
+standard deviations say (another laboratory's people, a table that cuts the trunk elsewhere), and without a reference
+the declared mass may be wrong or include the load: these hypotheses (`unloaded_bodies`) are weighted by their evidence
+together with the load, so that a load is announced only where an odd body cannot do as well.
+
+A load of m kg has the parameters m (u + G z): u and G G' are mean and covariance of a load of 1 kg whose place is
+unknown (`unit_load`), z is standard normal. Whitened data y, in which the body's own uncertainty is noise of unit
+variance, then have the mean m b and the covariance 1 + m² D D', with b = B u, D = B G and B the segment's columns. For
+every m that is closed form, so "no load" and every mass stand in one table of weights: the probability of no load and
+the interval of the mass are read from the same numbers and cannot contradict each other.
+
+Whether there is a load is a question of evidence, for which mass and place need a proper prior. How heavy it is, is
+not: the data tell mass and first moments, m and m x, and a place that is as likely anywhere in and near the box spreads
+the first moments of m kg over a volume of m³. The evidence prefers lighter loads for it: 2.4 ± 0.3 kg near the middle
+of a segment came out 0.1 kg light. The size is weighed by Jeffreys' prior, for which a mass is not the less probable
+the better its first moments are known: `LoadView.log_place_information` gives back what the evidence takes.
 """
 
 from bisect import bisect_left
@@ -13,27 +25,255 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from biodance.identification.identification import Identification
-from biodance.identification.information import Information
-from biodance.identification.load_posterior import (
-    MASSES,
-    LoadPosterior,
-    LoadView,
-    log_mass_prior,
-    log_ratio_if,
-)
-from biodance.identification.loads import unit_load
-from biodance.identification.unloaded_body import (
-    UnloadedBody,
-    expect_unloaded,
-    tables_by_sides,
-    unloaded_bodies,
-    whiten_innovation,
-)
-from biodance.records import Array
+from biodance.identification.loads import ODDS, matter_follows_joint, unit_load, with_matter_placed, with_sides
+from biodance.identification.posterior import Information
+from biodance.records import Array, Sip
 from biodance.threads import one_thread
+from biodance.uncertainty.caution import in_other_frames
+
+_ODD = (1.0, 1.5, 2.25, 3.4)
+"""Times that the body may differ from what was known before by more than its standard deviations, equally probable."""
+_DECLARED = ((0.0, False, 0.4), (0.0, True, 0.4), (2.5, False, 0.2))
+"""What the declared mass may be: kg by which it is wrong (standard deviation), whether it holds the load, probability.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class UnloadedBody:
+    """One hypothesis on the body without a load: its prior ``before``, with ``log_prior``; ``holds``: whether the
+    declared mass includes the load, so that the body is lighter by it.
+    """
+
+    before: Sip
+    log_prior: float
+    holds: bool
+
+
+def expect_unloaded(reference: Identification, session: Identification) -> Sip:
+    """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
+
+    The posterior of the reference, moved by what the table itself changed between the sessions (another static trial,
+    other lengths), with the trunk's matter in the same of its two places, known as on another day (markers glued
+    anew). The session's table counts at the mass of the
+    reference: the mass that the session declares may hold the load.
+
+    Raises
+    ------
+    NotSolved
+        The reference contradicts every possible body, so its posterior is none of a body.
+    """
+    along = matter_follows_joint(reference.posterior.prior, reference.body)
+    same = with_matter_placed(session.posterior.prior, session.body, along=along)
+    table = scaled_to_mass(same, float(reference.posterior.prior.mass.sum()))
+    shift = table.phi - reference.posterior.prior.phi
+    moved = Sip(reference.sip.segments, reference.posterior.mean + shift, reference.posterior.covariance)
+    return in_other_frames(moved, session.body.joint_errors)
+
+
+def tables_by_sides(session: Identification) -> tuple[tuple[Sip, float], ...]:
+    """Return the table of ``session`` with sides alike and with each side on its own, each with its log probability: a
+    load on one side may not pass for sides that are not alike, nor what a side has of its own for a load.
+    """
+    prior = session.posterior.prior
+    alike, apart = (prior if session.apart == one else with_sides(prior, apart=one) for one in (False, True))
+    # Odds of 2 for alike sides as log probabilities: 1 / (1 + e^-odds) and 1 / (1 + e^odds).
+    return (alike, float(-np.log1p(np.exp(-ODDS)))), (apart, float(-np.log1p(np.exp(ODDS))))
+
+
+def table_like(one: Identification, other: Identification) -> Sip:
+    """Return the table of session ``one`` with the trunk's matter and the sides as in session ``other``."""
+    table = with_matter_placed(
+        one.posterior.prior, one.body, along=matter_follows_joint(other.posterior.prior, other.body)
+    )
+    apart = one.apart and table is one.posterior.prior
+    return table if apart == other.apart else with_sides(table, apart=other.apart)
+
+
+def scaled_to_mass(prior: Sip, mass: float) -> Sip:
+    """Return the table ``prior`` scaled to a body of the same build with a total mass of ``mass`` kg."""
+    ratio = mass / float(prior.mass.sum())
+    # A body scaled by r: mean times r, covariance times r².
+    return Sip(prior.segments, ratio * prior.phi, ratio**2 * np.asarray(prior.covariance))
+
+
+def unloaded_bodies(tables: tuple[tuple[Sip, float], ...], *, weighed: bool) -> tuple[UnloadedBody, ...]:
+    """Return the hypotheses on the body without a load: priors inflated from each of the ``tables`` (given with log
+    probabilities), and, unless it was ``weighed`` without a load, a declared mass that includes the load or is wrong.
+    """
+    cases = ((0.0, False, 1.0),) if weighed else _DECLARED
+    return tuple(
+        UnloadedBody(inflate_prior(table, times, wrong), log + float(np.log(share / len(_ODD))), holds)
+        for table, log in tables
+        for wrong, holds, share in cases
+        for times in _ODD
+    )
+
+
+def inflate_prior(before: Sip, times: float, wrong: float = 0.0) -> Sip:
+    """Return ``before`` with all standard deviations multiplied by ``times`` at unchanged uncertainty of the total
+    mass; then with an error of the total mass of standard deviation ``wrong`` kg, distributed over the segments in
+    proportion.
+    """
+    covariance = np.asarray(before.covariance)
+    total = np.tile(np.eye(10)[0], len(before.segments))
+    # C 1 (1 the masses): covariance of every parameter with the total mass.
+    gain = covariance @ total
+    known = float(total @ gain)
+    if known > 0:
+        # The part of C that goes with the total: its variance is known, only the rest is inflated.
+        shared = np.outer(gain, gain) / known
+        covariance = times**2 * (covariance - shared) + shared
+    # One kilogram of this body in its own proportions.
+    body = before.phi / (total @ before.phi)
+    return Sip(before.segments, before.phi, covariance + wrong**2 * np.outer(body, body))
+
+
+def whiten_innovation(data: Information, before: Sip) -> tuple[Array, Array, float]:
+    """Return the rows of the data (r, p) and the innovation relative to ``before`` (r,), both whitened by noise and by
+    the uncertainty of ``before``, and the log evidence of the data without a load.
+
+    With R phi = y + noise and phi ~ N(before, P): y - R before has the covariance 1 + R P R'.
+    """
+    # Innovation y - R phi0 has the covariance 1 + R P R' = L L'.
+    spread = data.triangle @ before.covariance @ data.triangle.T
+    L = np.linalg.cholesky(np.eye(len(spread)) + spread)
+    both = np.column_stack([data.triangle, data.target - data.triangle @ before.phi])
+    white = solve_triangular(L, both, lower=True)
+    # - log|L L'| / 2 - |L^-1 innovation|² / 2.
+    log_evidence = -float(np.log(np.diag(L)).sum()) - 0.5 * float(white[:, -1] @ white[:, -1])
+    return white[:, :-1], white[:, -1], log_evidence
+
+
+MASSES = np.geomspace(0.005, 50.0, 1200)
+"""(n,) kg at which the posterior is tabled: 0.8 % apart."""
+_USUAL = 5.0
+"""kg: loads are half normal with this deviation; it shrinks 2.4 ± 0.25 kg by 0.006 kg."""
+_TAIL = 0.025
+"""Probability on each side of a 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPosterior:
+    """``none`` probability that there is no load; ``weight`` (n,) probability of a load of each of `MASSES`, with
+    ``none`` summing to 1.
+    """
+
+    none: float
+    weight: Array
+
+    @property
+    def mass(self) -> float:
+        """Expected load, kg: 0 counts with the probability of no load."""
+        return float(self.weight @ MASSES)
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the load, kg."""
+        # E[m²] - E[m]².
+        return float(np.sqrt(max(float(self.weight @ MASSES**2) - self.mass**2, 0.0)))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the load, kg, each tail 2.5 %; it starts at 0 where no load is more probable than that."""
+        low, high = (self._quantile(share) for share in (_TAIL, 1 - _TAIL))
+        return low, high
+
+    def _quantile(self, share: float) -> float:
+        # Distribution function at the middle of each cell; the mass `none` sits at zero.
+        below = self.none + np.cumsum(self.weight) - 0.5 * self.weight
+        return float(np.interp(share, np.append(self.none, below), np.append(0.0, MASSES), left=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadView:
+    """What data say of a load on one segment, in the directions in which its place is unknown.
+
+    Where the body's mass holds the load's, b is less by what a body shows per kilogram.
+
+    ``squares`` b'b; ``shown`` b'y; ``strength`` (k,) eigenvalues of D'D; ``unit`` and ``surprise`` (k,) D'b and D'y in
+    their basis; ``ways`` (10, k) parameters per kg that each direction changes; ``mean`` (10,) u.
+    """
+
+    squares: float
+    shown: float
+    strength: Array
+    unit: Array
+    surprise: Array
+    ways: Array
+    mean: Array
+
+    @classmethod
+    def of(cls, columns: Array, surprise: Array, unit: tuple[Array, Array], less: Array) -> "LoadView":
+        """Return the view through ``columns`` (r, 10) of a segment at what the data show, ``surprise`` (r,); ``unit``
+        mean (10,) and factor (10, k) of a load of 1 kg, ``less`` (r,) what the body shows less for every kilogram of
+        it.
+        """
+        mean, factor = unit
+        # Mean of a load's data per kg, and what its unknown place adds; (r,) and (r, k).
+        b, D = columns @ mean - less, columns @ factor
+        # In the eigenvectors of D'D the covariance 1 + m² D D' is diagonal on the directions of D.
+        strength, basis = np.linalg.eigh(D.T @ D)
+        D = D @ basis
+        return cls(
+            float(b @ b), float(b @ surprise), np.maximum(strength, 0.0), D.T @ b, D.T @ surprise, factor @ basis, mean
+        )
+
+    def log_ratio(self, masses: Array) -> Array:
+        """Return the log likelihood ratio (n,) of loads of ``masses`` (n,) kg against none."""
+        # Of each direction (k, 1) for every mass: Woodbury for the quadratic form of N(y; m b, 1 + m² D D').
+        surprise, unit, wide = self.surprise[:, None], self.unit[:, None], self._wide(masses)
+        spread = ((masses * (surprise - masses * unit)) ** 2 / wide).sum(axis=0) - np.log(wide.prod(axis=0))
+        return np.asarray(masses * self.shown - 0.5 * masses**2 * self.squares + 0.5 * spread)
+
+    def log_place_information(self, masses: Array) -> Array:
+        """Return half the logarithm (n,) of how much better the place of loads of ``masses`` (n,) kg is known after
+        the data: what the evidence of each mass pays for places that the data exclude.
+        """
+        return np.asarray(0.5 * np.log(self._wide(masses).prod(axis=0)))
+
+    def at_the_mean(self, masses: Array) -> tuple[Array, Array]:
+        """Return sum u² / (1 + m² D'D) and sum log(1 + m² D'D) (n,) for ``masses`` (n,) kg, see `log_ratio_if`."""
+        wide = self._wide(masses)
+        return (self.unit[:, None] ** 2 / wide).sum(axis=0), np.log(wide.prod(axis=0))
+
+    def _wide(self, masses: Array) -> Array:
+        """Return (k, n) the eigenvalues of 1 + m² D D' other than 1; their product is its determinant."""
+        return np.asarray(1 + np.multiply.outer(self.strength, masses**2))
+
+    def place(self, weight: Array) -> tuple[Array, Array]:
+        """Return mean and standard deviation (3,) m of the load's CoM in the segment's frame, over masses of
+        ``weight`` (n,).
+        """
+        m = MASSES[:, None]
+        narrow = 1 / (1 + m**2 * self.strength)
+        # E[z | m, y] = m (D'y - m D'b) / (1 + m² w) per direction, turned into metres by `ways`.
+        place = self.mean[1:4] + (m * narrow * (self.surprise - m * self.unit)) @ self.ways[1:4].T
+        share = weight / weight.sum()
+        mean = share @ place
+        # Law of total variance over the masses: var(z | m) = 1 / (1 + m² w), plus that of the means.
+        return mean, np.sqrt(share @ (narrow @ (self.ways[1:4] ** 2).T + (place - mean) ** 2))
+
+
+def log_ratio_if(true: float, masses: Array, squares: Array, own: Array, wide: Array) -> Array:
+    """Return the log likelihood ratio (r, n) of loads of ``masses`` (n,) kg against none in r views, if the data showed
+    a load of ``true`` kg at the mean place and nothing else; ``squares`` (r,) b'b, ``own`` and ``wide`` (r, n) of each
+    view `at_the_mean`.
+    """
+    # y = true b: m b'y - m² b'b / 2 = (true m - m² / 2) b'b.
+    shown = np.multiply.outer(squares, true * masses - 0.5 * masses**2)
+    return np.asarray(shown + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide))
+
+
+def log_mass_prior(masses: Array) -> Array:
+    """Return the log probability (n,) of each of ``masses`` (n,) kg, given that there is a load."""
+    # Half normal density times the width of each mass's cell (the masses are spaced geometrically).
+    log = -0.5 * (masses / _USUAL) ** 2 + np.log(np.gradient(masses))
+    return np.asarray(log - np.log(np.exp(log).sum()))
+
 
 _THRESHOLD = 0.01
 """Probability of "no load" below which a load is announced."""

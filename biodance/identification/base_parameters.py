@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.information import Information, fold
+from biodance.identification.posterior import Information, fold
 from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion, freeze

@@ -14,20 +14,16 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.calibration import discounted, undo_dilution
-from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_interval, known_together
-from biodance.identification.learning import learn_noise
-from biodance.identification.loads import unknown_loads, with_room
-from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
+from biodance.identification.loads import more_probable_table, possible_tables, unknown_loads, with_room
+from biodance.identification.mismatch import Mismatch, Sizes, discounted, mismatch, softness, undo_dilution
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.placement import more_probable_table, possible_tables
-from biodance.identification.posterior import BodyPosterior, find_posterior
-from biodance.identification.statistics import Fit, Statistics, layout_for, statistics_together, usable
+from biodance.identification.posterior import BodyPosterior, Information, find_posterior
+from biodance.identification.statistics import Fit, Statistics, learn_noise, statistics, usable
 from biodance.records import Sip
 from biodance.threads import Sendable, one_thread
+from biodance.uncertainty.bands import Noise
 from biodance.uncertainty.caution import from_true_centres, widened_prior
-from biodance.uncertainty.noise import Noise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -216,7 +212,7 @@ def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None
         There is no trial, or none has a usable frame.
     """
     used, about, notes = usable(body, fits)
-    found = conclude_trials(body, statistics_together(body, used, layout_for(about)), used, prior=prior)
+    found = conclude_trials(body, statistics(body, used, Noise.unit(about)), used, prior=prior)
     return replace(found, notes=(*notes, *found.notes))
 
 

@@ -1,10 +1,11 @@
-"""What a session can know: every quantity with its interval before and after the data, and a verdict in words.
+"""What a session can know: every quantity with its interval before and after the data, and a verdict in words; and
+while a session runs, what its samples so far say of the masses.
 
 Quantities are those an analyst asks for: mass, centre of mass and inertia about it, per segment. Their standard
 deviations follow from the covariance of the ten parameters by the first derivative.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -101,28 +102,14 @@ def knowledge(after: Sip, before: Sip, posterior: BodyPosterior | None = None) -
         cut = slice(10 * i, 10 * i + 10)
         value, slope = segment_quantities(after.phi[cut])
         table, table_slope = segment_quantities(before.phi[cut])
-        sd, table_sd = (
-            _deviation(slope, after.covariance[cut, cut]),
-            _deviation(table_slope, before.covariance[cut, cut]),
-        )
+        sd = _deviation(slope, after.covariance[cut, cut])
+        table_sd = _deviation(table_slope, before.covariance[cut, cut])
         # Before and after the data both by the table's slope: their ratio is not that of two linearisations.
         left, whole = (_deviation(table_slope, c[cut, cut]) for c in (then, first))
         share = np.clip(1 - np.divide(left**2, whole**2, out=np.ones(10), where=whole > 0), 0.0, 1.0)
-        for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
-            numbers = [float(column[k]) for column in (value, sd, table, table_sd, share)]
-            rows.append(
-                Known(
-                    segment,
-                    quantity,
-                    unit,
-                    numbers[0],
-                    numbers[1],
-                    numbers[2],
-                    numbers[3],
-                    numbers[4],
-                    _verdict(numbers[4]),
-                )
-            )
+        numbers = np.array([value, sd, table, table_sd, share]).tolist()
+        for quantity, unit, now, now_sd, was, was_sd, part in zip(QUANTITIES, UNITS, *numbers, strict=True):
+            rows.append(Known(segment, quantity, unit, now, now_sd, was, was_sd, part, _verdict(part)))
     return tuple(rows)
 
 
@@ -171,3 +158,46 @@ def _deviation(slope: Array, covariance: Array) -> Array:
 
 def _verdict(share: float) -> Knowability:
     return "known" if share >= KNOWN else "partly known" if share >= PARTLY else "cannot be known"
+
+
+@dataclass(frozen=True, eq=False)
+class RecursivePosterior:
+    """Gaussian posterior: ``prior`` as given, ``mean`` (p,) and ``covariance`` (p, p) after the samples so far."""
+
+    prior: Sip
+    mean: Array
+    covariance: Array
+
+    def expected(self, W: Array) -> tuple[Array, Array]:
+        """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance due to the
+        uncertainty of the parameters.
+        """
+        # Diagonal of W C W' per sample: sum over j, k of W[i, j] C[j, k] W[i, k].
+        return W @ self.mean, np.einsum("...ij,jk,...ik->...i", W, self.covariance, W, optimize=True)
+
+    def updated(self, W: Array, wrench: Array, variance: Array) -> "RecursivePosterior":
+        """Return the posterior after one sample: ``W`` (6, p), ``wrench`` (6,) N, N·m with noise of ``variance`` (6,).
+
+        Source: Kalman 1960, doi:10.1115/1.3662552, with a state that stays.
+        """
+        seen = self.covariance @ W.T
+        # K = C W'(W C W' + R)^-1; the innovation's covariance is symmetric, so K' solves it.
+        gain = np.linalg.solve(W @ seen + np.diag(variance), seen.T).T
+        # C - K W C; rounding makes it unsymmetric, mended below.
+        covariance = self.covariance - gain @ seen.T
+        return replace(
+            self,
+            mean=self.mean + gain @ (wrench - W @ self.mean),
+            covariance=(covariance + covariance.T) / 2,
+        )
+
+    def verdicts(self) -> dict[str, Knowability]:
+        """Return for every segment how well its mass is known, as `knowledge` has it."""
+        first, now = np.diag(self.prior.covariance)[::10], np.diag(self.covariance)[::10]
+        share = 1 - np.divide(now, first, out=np.ones_like(now), where=first > 0)
+        return dict(zip(self.prior.segments, map(_verdict, share), strict=True))
+
+
+def initial_posterior(prior: Sip) -> RecursivePosterior:
+    """Return the posterior before the first sample, equal to ``prior``."""
+    return RecursivePosterior(prior, np.array(prior.phi), np.array(prior.covariance))

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from biodance.body.parts import TENSOR
+from biodance.body.parts import TENSOR, inertia_tensor
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.identification import Identification
-from biodance.identification.information import Information
 from biodance.identification.knowledge import knowledge
 from biodance.identification.physical import FailedFit, PhysicalFit
-from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.identification.posterior import Information
+from biodance.identification.statistics import Fit, statistics, usable
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.bands import WHITE
+from biodance.uncertainty.bands import WHITE, Noise
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -60,13 +60,6 @@ def directions() -> Array:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
-def _tensor(phi: Array) -> Array:
-    tensor = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        tensor[i, j] = tensor[j, i] = value
-    return tensor
-
-
 def inequalities(body: "Body") -> tuple[Array, Array]:
     """Return A (k, 10N), b (k,) of ``A phi >= b``: masses, CoM boxes and sampled directions (paper eq. 8-10)."""
     rows, level = [], []
@@ -85,7 +78,7 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
         wide = np.zeros((len(block), 10 * len(body.segments)))
         wide[:, 10 * s : 10 * s + 10] = block
         # Smallest eigenvalue first, as `eigvalsh` sorts.
-        eps = RELATIVE_EPS * max(float(np.linalg.eigvalsh(_tensor(body.sip.of(name)))[0]), 0.0)
+        eps = RELATIVE_EPS * max(float(np.linalg.eigvalsh(inertia_tensor(body.sip.of(name)[4:]))[0]), 0.0)
         rows.append(wide)
         level.append(np.concatenate([np.zeros(7), np.full(DIRECTIONS, eps)]))
     return np.concatenate(rows), np.concatenate(level)
@@ -126,8 +119,8 @@ def identify_as_paper(found: Identification, fits: tuple[Fit, ...]) -> Identific
     Where it has no solution, the fit failed.
     """
     used, about, _ = usable(found.body, fits)
-    layout = layout_for(about, WHITE)
-    data = statistics_together(found.body, used, layout).information(layout)
+    layout = Noise.unit(about, WHITE)
+    data = statistics(found.body, used, layout).information(layout)
     solved, frames = paper_programme(data, found.body), data.frames
     if solved.status == "failed":
         return replace(found, fit=solved, known=(), notes=(solved.cause,), frames=frames)

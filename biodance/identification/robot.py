@@ -15,9 +15,8 @@ import numpy as np
 from biodance.body.body import Body, load_pinocchio
 from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
 from biodance.identification.identification import Identification, conclude
-from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import Mismatch, long_runs
-from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.identification.statistics import START, Fit, learn_noise, statistics, usable
 from biodance.lab.prepare import LowPass, low_pass
 from biodance.motion.dynamics import distribute, joint_torques, predict_wrench, regressor
 from biodance.motion.grounded import Grounded, ground_again
@@ -25,8 +24,7 @@ from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, Wrench
 from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 from biodance.threads import one_thread
-from biodance.uncertainty.bands import WHITE, Bands
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import WHITE, Bands, Noise
 from biodance.uncertainty.plates import plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
@@ -81,8 +79,8 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
         No trial has a usable frame.
     """
     fits, about, notes = usable(body, tuple(one.fit for one in trials))
-    layout = layout_for(about, _BANDS)
-    total = statistics_together(body, fits, layout)
+    layout = Noise.unit(about, _BANDS)
+    total = statistics(body, fits, layout)
     noise = learn_noise(total, body.sip, start=robot_start(body))
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
@@ -94,8 +92,8 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
     """Return the base parameters by weighted least squares on frames that count as independent (paper eq. 7), no prior:
     sigma from what the fit itself leaves of every channel and (W' W)^-1.
     """
-    layout = layout_for(about, WHITE)
-    total = statistics_together(body, fits, layout)
+    layout = Noise.unit(about, WHITE)
+    total = statistics(body, fits, layout)
     noise, phi = replace(layout, covariance=robot_start(body)[None]), np.zeros(10 * len(body.segments))
     for _ in range(_ROUNDS):
         found = estimate_base(total.information(noise), base)

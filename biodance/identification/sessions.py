@@ -8,13 +8,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from biodance.errors import BiodanceError, NotSolved
-from biodance.identification.added_mass import added_mass
+from biodance.identification.added_mass import added_mass, scaled_to_mass, table_like
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
 from biodance.identification.loads import unknown_loads, with_room
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import BodyPosterior, find_posterior
-from biodance.identification.unloaded_body import scaled_to_mass, table_like
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 

@@ -450,9 +450,7 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
         for index, plate in enumerate(trial.plates)
         if (_unread(place, feet.rests, borne, index) & ((inside(plate, soles.outline) >= 0).mean(axis=2) > 0.5)).any()
     )
-    return Contact(
-        soles.time, touching, place.on_plate, measured, outside, notes, told, left_out, feet.seated, silent
-    )
+    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told, left_out, feet.seated, silent)
 
 
 def _told(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> Mask:

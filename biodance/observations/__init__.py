@@ -22,6 +22,7 @@ import numpy as np
 from biodance.discovery import Chosen, Family
 from biodance.observations._causes import (
     ObservableCause,
+    Sensitivity,
     corrected,
     possible_causes,
     sensitivities,
@@ -29,9 +30,8 @@ from biodance.observations._causes import (
     with_changed_plate,
 )
 from biodance.observations._feet import FootPath
-from biodance.observations._landmark import LANDMARK, shift_per_sd
 from biodance.observations._recording import ONSET, FootStep, SeenTrial, recording
-from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._stance import LANDMARK, shift_per_sd
 from biodance.records import assign
 
 _TIME = re.compile(r" (at|from) [-\d.]+ s")

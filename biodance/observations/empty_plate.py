@@ -9,9 +9,8 @@ import numpy as np
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import Observation, Observer, SeenTrial
-from biodance.observations._causes import was_zeroed
+from biodance.observations._causes import Sensitivity, of_mean, was_zeroed
 from biodance.observations._recording import ONSET
-from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import CHANNELS, Plate
 
 _SETTLES = 0.15

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import FootPath, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity, of_mean
+from biodance.observations._causes import Sensitivity, of_mean
 from biodance.records import Array, runs
 
 _HIGH = 0.06

@@ -12,8 +12,7 @@ from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
 from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
-from biodance.observations._landmark import landmark_across
-from biodance.observations._stance import step_course
+from biodance.observations._stance import landmark_across, step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -21,7 +20,7 @@ ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "late": (0.60, 0.80, -0.006, 0.0055, 0.0070, 0.0040),
 }
 """Start and stop of the phase as shares of stance; expected m outwards; m sd of one step, of one foot of one person, of
-one laboratory's people beside its markers (`_landmark`)."""
+one laboratory's people beside its markers (`landmark_across`)."""
 _RUNNING: Mapping[str, tuple[float, ...]] = {"running": (0.30, 0.60, -0.001, 0.0080, 0.0090, 0.0050)}
 """The same of a foot that runs: the pressure stays near the foot's line, too (De Cock et al. 2008,
 doi:10.1016/j.gaitpost.2007.08.013); no public running was there to learn from, so all is twice as uncertain.
@@ -40,11 +39,8 @@ class FootAcross(Observer):
         """Return three observations of each walking step, the early one only where the heel came down first, on one
         plate alone; one of each running step.
         """
-        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
-
-    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         ways = ((ACROSS_PHASES, False), (_RUNNING, True))
-        return [one for way in ways for one in self._phases(seen, step, *way)]
+        return tuple(one for step in seen.steps for way in ways for one in self._phases(seen, step, *way))
 
     def _phases(
         self, seen: SeenTrial, step: FootStep, phases: Mapping[str, tuple[float, ...]], running: bool

@@ -4,14 +4,14 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 plates, tell plate from foot.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
-from biodance.observations._landmark import landmark_along
-from biodance.observations._stance import step_course
+from biodance.observations._stance import StepCourse, landmark_along, step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -34,12 +34,13 @@ class FootAlong(Observer):
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of each step in which the heel came down first, one of a foot on two plates."""
-        return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
+        found: list[Observation] = []
+        for step in seen.steps:
+            part = step_course(seen, step) if step.heel_first else None
+            found += self._phases(seen, step, part) if part is not None else ()
+        return tuple(found)
 
-    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part, found = step_course(seen, step), []
-        if part is None:
-            return []
+    def _phases(self, seen: SeenTrial, step: FootStep, part: StepCourse) -> Iterator[Observation]:
         path, trial = seen.foot(step.side), seen.trial.name
         phases = {"middle": _MIDDLE} if step.beside else ALONG_PHASES
         for phase, (start, stop, share, sd, person, laboratory) in phases.items():
@@ -54,13 +55,10 @@ class FootAlong(Observer):
             # a toe marker e inwards turns the axis by e / length: the distance ahead loses beside * e / length.
             levers = {(step.side, "backwards"): 1 - share, (step.side, "inwards"): -beside / part.length}
             what, expected = f"{step.name}, {phase}", share * part.length
-            found.append(
-                Observation(
-                    self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
-                    replace(responds, landmarks=levers),
-                )
+            yield Observation(
+                self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
+                replace(responds, landmarks=levers),
             )  # fmt: skip
-        return found
 
 
 OBSERVER = FootAlong

@@ -6,7 +6,7 @@ from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_position import PlatePosition
 from biodance.motion.soles import distance_to_hull
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
+from biodance.observations._causes import Sensitivity, by_plate, pressure_gradient
 from biodance.records import Array
 
 _STEADY = (0.1, 0.9)

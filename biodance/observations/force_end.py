@@ -7,8 +7,8 @@ that runs, has no such instant: its largest acceleration is anywhere (40 ms apar
 import numpy as np
 
 from biodance.effects.time_delay import TimeDelay
-from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity
+from biodance.observations import FootPath, Observation, Observer, SeenTrial
+from biodance.observations._causes import Sensitivity
 from biodance.observations._stance import crossing, steps, walks
 from biodance.records import Array
 
@@ -31,23 +31,21 @@ class ForceEnd(Observer):
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each step that ends within the recording."""
-        return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
-
-    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part, wrench = seen.stance(step), seen.plate(step.plate).wrench
-        time = wrench.time
-        if part is None or part.stop >= time.size or not (walks(seen, step) and steps(seen, step)):
-            return []
-        end, foot = float(time[part.stop - 1]), seen.foot(step.side)
-        value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}
-        _, slope = crossing(wrench, part.stop)
-        responds = Sensitivity({step.plate: slope}, delay=1.0)
-        return [
-            Observation(
-                self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms,
-                sensitivity=responds,
-            )
-        ]  # fmt: skip
+        found = []
+        for step in (one for one in seen.steps if not one.mixed and walks(seen, one) and steps(seen, one)):
+            part, wrench = seen.stance(step), seen.plate(step.plate).wrench
+            if part is None or part.stop >= wrench.time.size:
+                continue
+            end = float(wrench.time[part.stop - 1])
+            value = end - toe_pulled(seen.foot(step.side), step.middle, end)
+            _, slope = crossing(wrench, part.stop)
+            found.append(
+                Observation(
+                    self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate,
+                    {"person toe off": _PERSON}, sensitivity=Sensitivity({step.plate: slope}, delay=1.0),
+                )
+            )  # fmt: skip
+        return tuple(found)
 
 
 def toe_pulled(foot: FootPath, middle: float, near: float) -> float:

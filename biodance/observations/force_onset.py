@@ -7,8 +7,8 @@ swing: only the peaks near the ground count, and of these the one that is highes
 import numpy as np
 
 from biodance.effects.time_delay import TimeDelay
-from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity
+from biodance.observations import FootPath, Observation, Observer, SeenTrial
+from biodance.observations._causes import Sensitivity
 from biodance.observations._stance import crossing, steps
 from biodance.records import Array
 
@@ -31,28 +31,21 @@ class ForceOnset(Observer):
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each heel strike."""
-        return tuple(
-            one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)
-        )
-
-    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part = seen.stance(step)
-        if part is None or part.start == 0 or not steps(seen, step):
-            return []
-        onset, slope = crossing(seen.plate(step.plate).wrench, part.start)
-        foot = seen.foot(step.side)
-        struck = heel_strike(foot, step.middle, onset)
-        expected, step_sd, laboratory = ONSET_AFTER_STRIKE
-        own = float(np.hypot(step_sd, 0.25 / foot.rate))
-        norms = {"laboratory onset": laboratory}
-        value = onset - struck
-        responds = Sensitivity({step.plate: slope}, delay=1.0)
-        return [
-            Observation(
-                self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms,
-                sensitivity=responds,
-            )
-        ]  # fmt: skip
+        found, (expected, step_sd, laboratory) = [], ONSET_AFTER_STRIKE
+        for step in (one for one in seen.steps if one.heel_first and not one.mixed and steps(seen, one)):
+            part, foot = seen.stance(step), seen.foot(step.side)
+            if part is None or part.start == 0:
+                continue
+            onset, slope = crossing(seen.plate(step.plate).wrench, part.start)
+            value = onset - heel_strike(foot, step.middle, onset)
+            own = float(np.hypot(step_sd, 0.25 / foot.rate))
+            found.append(
+                Observation(
+                    self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate,
+                    {"laboratory onset": laboratory}, sensitivity=Sensitivity({step.plate: slope}, delay=1.0),
+                )
+            )  # fmt: skip
+        return tuple(found)
 
 
 def heel_strike(foot: FootPath, middle: float, near: float) -> float:

@@ -14,7 +14,7 @@ from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.time_delay import TimeDelay
 from biodance.motion.newton import LagAndMass, slopes_of
 from biodance.observations import Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._causes import Sensitivity
 from biodance.observations.stride_force import StrideForce
 from biodance.records import Array
 

@@ -12,7 +12,7 @@ import numpy as np
 from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity, by_plate
+from biodance.observations._causes import Sensitivity, by_plate
 from biodance.observations._stance import StepCourse, step_course
 from biodance.records import Array
 

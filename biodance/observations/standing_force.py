@@ -10,8 +10,8 @@ from biodance.effects.plate_gain import PlateGain
 from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._causes import Sensitivity, of_mean
 from biodance.observations._recording import ONSET
-from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import Array, Plate
 
 _ON_PLATES = (0.75, 1.35)

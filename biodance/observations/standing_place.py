@@ -9,7 +9,7 @@ import numpy as np
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
+from biodance.observations._causes import Sensitivity, by_plate, pressure_gradient
 from biodance.observations.standing_force import mean_force
 from biodance.records import Array
 

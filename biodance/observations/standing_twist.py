@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import Observation, Observer, SeenTrial
-from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
+from biodance.observations._causes import Sensitivity, by_plate, pressure_gradient
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 

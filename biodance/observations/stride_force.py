@@ -18,8 +18,8 @@ from biodance.effects.clipping import Clipping
 from biodance.effects.plate_gain import PlateGain
 from biodance.motion.newton import fading
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._causes import Sensitivity, of_mean
 from biodance.observations._recording import ONSET
-from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.observations._stance import is_recorded, steps, walks
 from biodance.records import Array
 

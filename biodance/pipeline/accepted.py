@@ -28,9 +28,9 @@ from biodance.display import cause_in_words, spaced
 from biodance.effects import Case, Cause, NamedCause, QualityCheck, Recorded
 from biodance.effects.labels_swapped import WORSE, LabelsSwapped, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
+from biodance.identification.added_mass import tables_by_sides
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
-from biodance.identification.unloaded_body import tables_by_sides
 from biodance.inference.decision import Inferred
 from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving

@@ -11,10 +11,9 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.display import digits, listed, spaced
 from biodance.effects import CheckKind, QualityCheck
-from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.identification import NOT_WEIGHED
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check, Step, TrialResult
+from biodance.pipeline.trial import Check, Step, TrialResult
 from biodance.pipeline.words import (
     LOAD,
     alternatives,
@@ -23,6 +22,7 @@ from biodance.pipeline.words import (
     first_upper,
     names_markers,
     reason_notes,
+    size_and_segments,
     spoken,
 )
 from biodance.records.attention import (

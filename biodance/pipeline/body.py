@@ -11,14 +11,13 @@ from biodance.body.human.human import human
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.body.human.skeleton import with_tracking_limits
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.identification.unloaded_body import scaled_to_mass
+from biodance.identification.added_mass import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.contact import carried_elsewhere
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.functional_joints import PLACED, JointGain, functional_joints, with_shown_joints
 from biodance.motion.track import track
-from biodance.pipeline.trial import attempt
-from biodance.pipeline.trial_result import ON_A_FRAME, ForceGain, Step, TrialResult
+from biodance.pipeline.trial import ON_A_FRAME, ForceGain, Step, TrialResult, attempt
 from biodance.records import SIDES, Markers, Sip, Subject, Trial
 from biodance.settings import Settings
 from biodance.uncertainty.caution import in_other_frames

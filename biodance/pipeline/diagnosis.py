@@ -15,8 +15,7 @@ from biodance.effects import Cause, CheckKind, DiscreteEffect, Effect, Recorded,
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.added_mass import LoadSearch
-from biodance.identification.unloaded_body import expect_unloaded
+from biodance.identification.added_mass import LoadSearch, expect_unloaded
 from biodance.inference.decision import UNPLACED_LOAD
 from biodance.inference.session import judge, see
 from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections

@@ -27,8 +27,7 @@ from biodance.pipeline.program_folders import opensim_coordinates, state_notes, 
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import doubt_told, kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
-from biodance.pipeline.trial import contact_of, movement_of, prepare_trial
-from biodance.pipeline.trial_result import TrialResult, WrenchComparison
+from biodance.pipeline.trial import TrialResult, WrenchComparison, contact_of, movement_of, prepare_trial
 from biodance.records import SIDES, Array, Motion, Session, Trial
 from biodance.settings import COP_FORCE
 from biodance.version import __version__

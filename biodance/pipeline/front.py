@@ -27,8 +27,7 @@ from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.session import by_paper, followed, identification_of, identify_result
-from biodance.pipeline.trial import prepare_trial
-from biodance.pipeline.trial_result import Step
+from biodance.pipeline.trial import Step, prepare_trial
 from biodance.records import Motion, Session, Trial
 from biodance.registration import Limits, Registration, concluded, registered_folder, rival_delays, write_registered
 from biodance.registration.alignment import Alignment, Forces, alignments, forces_of, registered_plates

@@ -379,7 +379,7 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     from biodance.dance.expectation import score_performance
     from biodance.dance.visit_log import read_visit_logs
     from biodance.pipeline.identification import FITTED_ROLES
-    from biodance.pipeline.trial_result import trial_fit
+    from biodance.pipeline.trial import trial_fit
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
     if result.body is None:

@@ -16,17 +16,16 @@ from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.loads import nearest_segment
-from biodance.identification.plate_readings import plate_readings
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
-from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
+from biodance.identification.validation import ResidualRatio, TrialValidation, plate_readings, residual_ratio, validate
 from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.motion.newton import QuietStanding
 from biodance.observations import recording
 from biodance.observations.stride_force import StrideForce
-from biodance.pipeline.trial_result import OPEN, Check, TrialResult, WeighedBy, Weighing, trial_fit
+from biodance.pipeline.trial import OPEN, Check, TrialResult, WeighedBy, Weighing, trial_fit
 from biodance.records import ROLES, Role, Session, Sip, Subject
 from biodance.settings import TOUCH_FORCE, CheckLimits
 from biodance.threads import Sendable, one_thread

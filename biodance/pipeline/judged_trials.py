@@ -12,7 +12,7 @@ from biodance.effects import Case, QualityCheck, Recorded, check_quality
 from biodance.lab.markers.time_axis import of_postures
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult
 from biodance.records import LeftOut, Plate, Role, Trial, Wrench
 from biodance.records.attention import Judged
 

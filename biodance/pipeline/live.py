@@ -26,8 +26,7 @@ from biodance.diagnosis.watch import (
 )
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.identification import Identification, identify_body
-from biodance.identification.knowledge import Knowability
-from biodance.identification.recursive import RecursivePosterior, initial_posterior, summed_pressure
+from biodance.identification.knowledge import Knowability, RecursivePosterior, initial_posterior
 from biodance.identification.statistics import Fit, believable
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import at_marker_times, force_filter, highest_frequency, motion_filter
@@ -40,8 +39,7 @@ from biodance.motion.soles import soles_from_body
 from biodance.motion.track import smooth, upright_trunk
 from biodance.pipeline.body import body_of
 from biodance.pipeline.still import asked_words
-from biodance.pipeline.trial import prepare_trial
-from biodance.pipeline.trial_result import Step
+from biodance.pipeline.trial import Step, prepare_trial
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.threads import one_thread
@@ -233,7 +231,9 @@ class LiveSession:
             last = int(np.flatnonzero(fit.use)[-1])
             variance = _SLOW * self._watch.wrench.noise(self.posterior)
             self.posterior = self.posterior.updated(W[last], fit.wrench.value[last], variance)
-        self._pressure = self._pressure + summed_pressure(fit)
+        points = fit.wrench.cop()[fit.use]
+        loaded = points[np.isfinite(points).all(axis=1)]  # their sum and number give the mean
+        self._pressure = self._pressure + np.append(loaded.sum(axis=0), len(loaded))
         self._taken.append(fit)
 
     def _believed(self, part: Motion, wrench: Wrench, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:

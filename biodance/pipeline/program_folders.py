@@ -34,8 +34,7 @@ from biodance.motion.contact import foot_wrenches
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
-from biodance.pipeline.trial import contact_of, movement_of
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult, contact_of, movement_of
 from biodance.records import CHANNELS, Motion, Session, Trial, Wrench, longest_run, runs
 from biodance.version import __version__
 

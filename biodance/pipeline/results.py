@@ -25,7 +25,7 @@ from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.ik.functional_joints import JointGain
 from biodance.motion.newton import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.trial_result import ON_A_FRAME, Check, ForceGain, Step, TrialResult, Weighing, forces_told
+from biodance.pipeline.trial import ON_A_FRAME, Check, ForceGain, Step, TrialResult, Weighing, forces_told
 from biodance.records import Mask, Session, Sip, Subject, by_name
 from biodance.records.attention import Doubt
 from biodance.settings import Settings

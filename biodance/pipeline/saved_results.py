@@ -22,8 +22,7 @@ from biodance.lab.session.read import read_session, visit_words
 from biodance.lab.session.results_folder import doubt_about, read_manifest, refuse_mixture
 from biodance.library import refuse_large
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial import attempt, compare_wrenches, contact_of, prepare_trial
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial import TrialResult, attempt, compare_wrenches, contact_of, prepare_trial
 from biodance.records import Array, Motion, Session, Trial
 from biodance.records.motion import BY_FRAME
 from biodance.settings import Value

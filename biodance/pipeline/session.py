@@ -9,7 +9,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.identification.limbs import with_declared_limbs
+from biodance.identification.loads import with_declared_limbs
 from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.plates.faults import PlateCorrection, corrected_trial
 from biodance.motion.contact import carried_elsewhere
@@ -29,8 +29,7 @@ from biodance.pipeline.identification import (
     with_weighed_mass,
 )
 from biodance.pipeline.results import Placed, SessionResult
-from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import Step, TrialResult
+from biodance.pipeline.trial import Step, TrialResult, attempt, examine_trial, prepare_trial
 from biodance.records import Markers, Session
 from biodance.threads import one_thread
 

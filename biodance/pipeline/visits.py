@@ -23,7 +23,7 @@ from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import SessionMovement, describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import followed, identification_of
-from biodance.pipeline.trial_result import Weighing
+from biodance.pipeline.trial import Weighing
 from biodance.records import Session, side_in_name
 from biodance.records.attention import Attention
 from biodance.uncertainty.visits import (

@@ -19,8 +19,7 @@ from biodance.diagnosis.archive.judge import PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED, spaced
 from biodance.pipeline.lab_file import PLUG_IN_GAIT
-from biodance.pipeline.learn import LearnedLaboratory
-from biodance.pipeline.plates import PlatesJudged
+from biodance.pipeline.learn import LearnedLaboratory, PlatesJudged
 from biodance.pipeline.saved_results import now
 from biodance.report.figures.style import figure, look, svg_address
 from biodance.report.files import csv_text, write_results

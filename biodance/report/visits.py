@@ -15,7 +15,7 @@ from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.saved_results import now, provenance
 from biodance.pipeline.visits import ComparedQuantity, Untested, VisitComparison
 from biodance.report.figures import vector as svg
-from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
+from biodance.report.figures.session import CYCLE_AXES, LEAST_SPANS, curve_title
 from biodance.report.files import csv_text, write_results
 from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text

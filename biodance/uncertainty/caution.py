@@ -6,10 +6,12 @@ leaves out.
 """
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from biodance.body.parts import TENSOR, JointError
+from biodance.body.parts import TENSOR, JointError, inertia_tensor
 from biodance.body.tables.anthropometry import read_segment_table
 from biodance.body.tables.choice import BASE, PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
@@ -58,13 +60,15 @@ def misplaced(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
     off their true places, each on its own.
     """
     names = {error.joint for error in calibrated}
-    out = np.zeros((len(sip.phi), len(sip.phi)))
-    for i, segment in enumerate(sip.segments):
-        cut = slice(10 * i, 10 * i + 10)
-        # Isotropic error of the centre: slope S of (10, 3), covariance (sd S)(sd S)'.
-        slope = _centre_size(segment, names) * shift_slope(sip.phi[cut])
-        out[cut, cut] = slope @ slope.T
-    return out
+    return _by_segment(sip, lambda name, phi: _centre_size(name, names) * shift_slope(phi))
+
+
+def _by_segment(sip: Sip, slope: Callable[[str, Array], Array]) -> Array:
+    """Return the covariance (p, p) with S S' of each segment on its diagonal, S (10, n) what ``slope`` gives for its
+    name and parameters (10,): n independent errors of one standard deviation, each segment's its own.
+    """
+    each = (slope(name, phi) for name, phi in zip(sip.segments, sip.phi.reshape(-1, 10), strict=True))
+    return np.asarray(block_diag(*(one @ one.T for one in each)))
 
 
 def _centre_size(segment: str, calibrated: set[str]) -> float:
@@ -97,24 +101,15 @@ def from_true_centres(sip: Sip, table: Sip, calibrated: tuple[JointError, ...]) 
     # P^-1 B, of which K B = D P^-1 B is `shared`; 1 - P^-1 B = T' is `told`.
     kept = unit[:, None] * inverse * unit @ sip.covariance
     shared, told = off @ kept, np.eye(len(off)) - kept
-    return Sip(
-        sip.segments, sip.phi, sip.covariance + off - shared - shared.T + told.T @ _beyond(sip, calibrated) @ told
-    )
-
-
-def _beyond(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
-    """Return the covariance (p, p) of the parameters from how much farther off the movement that ``calibrated`` the
-    centres leaves them than `misplaced` counts.
-    """
     left = {error.joint: error.centre for error in calibrated}
-    out = np.zeros((len(sip.phi), len(sip.phi)))
-    for i, segment in enumerate(sip.segments):
-        # Independent errors: only the variance beyond what is counted already.
-        more = left.get(_joint_of(segment), 0.0) ** 2 - _centre_size(segment, set(left)) ** 2
-        cut = slice(10 * i, 10 * i + 10)
-        slope = np.sqrt(max(more, 0.0)) * shift_slope(sip.phi[cut])
-        out[cut, cut] = slope @ slope.T
-    return out
+
+    def beyond(name: str, phi: Array) -> Array:
+        # Independent errors: only the variance beyond what `misplaced` counts already.
+        more = left.get(_joint_of(name), 0.0) ** 2 - _centre_size(name, set(left)) ** 2
+        return np.sqrt(max(more, 0.0)) * shift_slope(phi)
+
+    farther = told.T @ _by_segment(sip, beyond) @ told
+    return Sip(sip.segments, sip.phi, sip.covariance + off - shared - shared.T + farther)
 
 
 def about_true_centres(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
@@ -124,14 +119,13 @@ def about_true_centres(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip
     The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as
     uncertain as the formula that predicted it, or as the movement that ``calibrated`` it left it.
     """
-    covariance = np.array(sip.covariance)
     known = {error.joint: error.centre for error in calibrated}
-    for i, segment in enumerate(sip.segments):
-        joint = _joint_of(segment)
-        sd = known.get(joint, joint_size("joint_centre", joint or segment))
-        slope = sd * shift_slope(sip.phi[10 * i : 10 * i + 10])
-        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
-    return Sip(sip.segments, sip.phi, covariance)
+
+    def centre(name: str, phi: Array) -> Array:
+        joint = _joint_of(name)
+        return known.get(joint, joint_size("joint_centre", joint or name)) * shift_slope(phi)
+
+    return Sip(sip.segments, sip.phi, sip.covariance + _by_segment(sip, centre))
 
 
 def in_other_frames(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
@@ -140,12 +134,8 @@ def in_other_frames(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     ``calibrated`` them left it.
     """
     known = about_true_centres(sip, calibrated)
-    covariance = np.array(known.covariance)
-    for i, segment in enumerate(sip.segments):
-        cut = slice(10 * i, 10 * i + 10)
-        slope = _turn_slope(sip.phi[cut]) * frame_turn(segment)
-        covariance[cut, cut] += slope @ slope.T
-    return Sip(sip.segments, sip.phi, covariance)
+    turned = _by_segment(sip, lambda name, phi: _turn_slope(phi) * frame_turn(name))
+    return Sip(sip.segments, sip.phi, known.covariance + turned)
 
 
 def _joint_of(segment: str) -> str:
@@ -208,10 +198,7 @@ def _averaged(segment: str) -> float:
 
 def _turn_slope(phi: Array) -> Array:
     """Return d phi / d rho (10, 3) for a turn of the matter by rho (3,) rad."""
-    inertia = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        inertia[i, j] = inertia[j, i] = value
-    out = np.zeros((10, 3))
+    inertia, out = inertia_tensor(phi[4:]), np.zeros((10, 3))
     for axis, S in enumerate(skew(np.eye(3))):
         # dh = rho x h, and dI = S I + I S' = S I - I S with S = [rho]x.
         out[1:4, axis] = S @ phi[1:4]

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, POSITION, ROTATION, PlateFault
 from biodance.records import CHANNELS, Array
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import Noise
 from biodance.uncertainty.tolerances import shipped
 
 SOURCES: tuple[tuple[PlateFault, str], ...] = (

@@ -15,7 +15,7 @@ from target import Target
 
 from biodance.body.body import Body
 from biodance.dance.problem.splines import Basis
-from biodance.identification.information import fold
+from biodance.identification.posterior import fold
 from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion

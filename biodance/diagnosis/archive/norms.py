@@ -8,8 +8,7 @@ import numpy as np
 from biodance.diagnosis.archive.conditions import pool
 from biodance.observations import observe, recording
 from biodance.records import Array, Trial
-from biodance.uncertainty.session_noise import camera_noise, plate_noise
-from biodance.uncertainty.skin_unrest import SkinUnrest
+from biodance.uncertainty.session_noise import SkinUnrest, camera_noise, plate_noise
 from biodance.uncertainty.tolerances import InstrumentNoise
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from biodance.body.solids import box_solid
 from biodance.child_process import run_python
 from biodance.display import BLACK, GREEN
-from biodance.pipeline.trial_result import Still
+from biodance.pipeline.still import Still
 from biodance.report.figures.style import SIDE_COLOURS
 
 _PATIENCE = 60.0  # Seconds after which the child is given up

@@ -9,12 +9,12 @@ import numpy as np
 from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED, Interval, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, known_interval
-from biodance.identification.load_words import say_load
 from biodance.identification.sessions import Difference, certain_changes
 from biodance.identification.torques import Impact, TorqueBands
 from biodance.identification.validation import TrialValidation
 from biodance.motion.dynamics import Agreement
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.words import say_load
 from biodance.records import CHANNEL_TITLES, AngleState
 from biodance.report.figures import vector as svg
 from biodance.report.figures.session import bar_list

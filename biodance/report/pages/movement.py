@@ -24,7 +24,7 @@ from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.words import first_upper
 from biodance.records import SIDES
-from biodance.report.figures.cycles import GROUND_PANELS, consistency_figure, pressure_figure, repetitions_figure
+from biodance.report.figures.session import GROUND_PANELS, consistency_figure, pressure_figure, repetitions_figure
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import FILE_ANGLE_ROW

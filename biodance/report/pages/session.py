@@ -16,7 +16,8 @@ import numpy as np
 from biodance.identification.validation import TrialValidation
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check, Still, TrialResult
+from biodance.pipeline.still import Still
+from biodance.pipeline.trial import Check, TrialResult
 from biodance.records import CHANNELS, AngleState, Array
 from biodance.records.attention import Attention
 from biodance.report.figures.session import (

@@ -13,8 +13,15 @@ from biodance.body.body import Body
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.summary import KeySummary, Repetitions
 from biodance.display import BLACK, BLUE, GREY, spaced
-from biodance.pipeline import for_subject
-from biodance.pipeline.for_subject import PartMass, SubjectAccount
+from biodance.pipeline.movement import (
+    WHY_DOUBTED,
+    WHY_FAULTY,
+    WHY_IMPOSSIBLE,
+    WHY_NOTHING,
+    WHY_STOPPED,
+    PartMass,
+    SubjectAccount,
+)
 from biodance.pipeline.still import silhouettes
 from biodance.records import SIDES, Array
 from biodance.report.figures import vector as svg
@@ -201,11 +208,11 @@ PLAIN_NAMES = {
     "left_forearm_hand": N_("left lower arm and hand"),
 }
 _WHY = {
-    for_subject.WHY_STOPPED: N_("The work was stopped before its end."),
-    for_subject.WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
-    for_subject.WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
-    for_subject.WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
-    for_subject.WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
+    WHY_STOPPED: N_("The work was stopped before its end."),
+    WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
+    WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
+    WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
+    WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
     "mass on the plates": N_("The weight on our plates was not the weight we wrote down."),
     "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
     "marker distance": N_("The small balls on your skin were not where our model of you had them."),

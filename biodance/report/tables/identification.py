@@ -6,9 +6,9 @@ from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS, Known, known_together
-from biodance.identification.load_words import say_load
 from biodance.identification.torques import TorqueBands
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.words import say_load
 from biodance.report.tables.schema import Row, Schema
 
 TENSOR_ORDER = ("xx", "xy", "yy", "xz", "yz", "zz")
