@@ -5,7 +5,7 @@ Only what moves is said, largest first, pairs together (right and left; trunk an
 rounded to what a person can follow; what goes beyond ``MOST`` things is said after them, so that nothing is left out.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from functools import cache
 
 import numpy as np
@@ -129,11 +129,10 @@ def calls(
     """Return what is called on the way from angles ``before`` to ``after`` (n,) degrees, largest change first; ``hips``
     their turn to the left, drop to the right and tilt forward (3,) degrees before and after; as one may ``say`` it.
     """
-    lifted = {j.name: (b, a) for j, b, a in zip(body.joints, before, after, strict=True) if "adduction" in j.name}
     changes = {
-        _as_called(joint.name, lifted): (float(b), float(a))
-        for joint, b, a in zip(body.joints, before, after, strict=True)
-        if abs(a - b) >= _SMALLEST and not _follows(joint.name, planted)
+        called: (start, end)
+        for name, called, start, end in _movements(body, before, after)
+        if abs(end - start) >= _SMALLEST and not _follows(name, planted)
     }
     whole_body = _words("hips")
     least = dict.fromkeys(whole_body, _SMALLEST)
@@ -166,13 +165,16 @@ def calls(
     return tuple(text for _, text in sorted(found, key=lambda call: -call[0]))
 
 
-def _as_called(name: str, lifted: Mapping[str, tuple[float, float]]) -> str:
-    """Return the name under which a joint's words stand; ``lifted`` are adductions before and after, degrees."""
-    side, movement = _split(name)
-    was, now = (angle <= _OUT for angle in lifted.get(f"{side}_shoulder_adduction", (0.0, 0.0)))
-    if movement != "shoulder_flexion" or not now:
-        return name
-    return f"{side}_forearm_turn" if was else f"{side}_arm_front"
+def _movements(body: Body, before: Array, after: Array) -> Iterator[tuple[str, str, float, float]]:
+    """Yield of every joint its name, the one of its words, and its angle before and after, degrees: flexion of a
+    shoulder turns an arm that is held out about itself.
+    """
+    angles = {joint.name: (float(b), float(a)) for joint, b, a in zip(body.joints, before, after, strict=True)}
+    for name, ends in angles.items():
+        side, movement = _split(name)
+        was, now = (angle <= _OUT for angle in angles.get(f"{side}_shoulder_adduction", (0.0, 0.0)))
+        turned = movement == "shoulder_flexion" and now
+        yield name, f"{side}_{'forearm_turn' if was else 'arm_front'}" if turned else name, *ends
 
 
 def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
