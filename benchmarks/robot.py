@@ -113,7 +113,7 @@ def simulate(dance: Dance, truth: Body, hold: float, troubles: dict[str, float])
         mujoco.mj_step(model, data)
         if k % EVERY == 0:
             applied = data.qfrc_applied[driver.v_place] + data.qfrc_passive[driver.v_place]
-            rows.append((k * _STEP, data.qpos[driver.q_place].copy(), applied, _floor_wrench(mujoco, model, data)))
+            rows.append((k * _STEP, data.qpos[driver.q_place].copy(), applied, _floor_wrench(data)))
             if data.qpos[2] < 0.5 * motion.q[0, 2]:
                 print(f"worst joint: {np.abs(now[:n] - data.qpos[driver.q_place]).max():.2f} rad from the plan")
                 raise SystemExit(f"fell at {k * _STEP / to.time:.1f} s")

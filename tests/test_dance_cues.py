@@ -39,6 +39,19 @@ def test_pairs_are_called_together_and_only_when_alike() -> None:
     assert len(calls(BODY, STRAIGHT, posture(right_elbow_flexion=60, left_elbow_flexion=100))) == 2
 
 
+def test_an_arm_that_stays_out_to_the_side_is_not_let_down_when_its_forearm_turns() -> None:
+    barrel = posture(left_shoulder_adduction=-85, left_elbow_flexion=75)
+    goalpost = posture(left_shoulder_adduction=-80, left_elbow_flexion=75, left_shoulder_flexion=85)
+    assert calls(BODY, barrel, goalpost) == ("turn the left forearm up to a right angle",)
+    assert calls(BODY, goalpost, barrel) == ("turn the left forearm forward",)
+    forward, down = posture(left_shoulder_flexion=90), STRAIGHT
+    assert calls(BODY, forward, down) == ("let the left arm down to the front of the body",)
+    assert calls(BODY, forward, posture(left_shoulder_adduction=-90)) == (
+        "bring the left arm back from the front",
+        "lift the left arm sideways to shoulder height",
+    )
+
+
 def test_going_back_is_said_as_the_place_not_as_zero() -> None:
     assert calls(BODY, posture(trunk_flexion=40), STRAIGHT) == ("bring the trunk upright",)
 

@@ -92,12 +92,12 @@ def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched, monke
 
 
 def test_feet_that_cannot_be_reached_are_named() -> None:
-    stances = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1), ("single_left", 1))))
+    blocks = (("parallel", 1), ("single_right", 1), ("single_left", 1))
+    stances = support_sequence(BODY, replace(PLAN, blocks=blocks))
     on = [(one.name, one.over) for one in stances]
     lift, down = on.index(("single_right", None)), on.index(("single_right", None)) + 1
-    assert NoNextPosture("", stances, lift - 1).stance == NoNextPosture("", stances, lift).stance == "single_right"
-    assert NoNextPosture("", stances, down).stance == "single_right"
-    assert NoNextPosture("", stances, down + 1).stance == NoNextPosture("", stances, down + 2).stance == "single_left"
+    named = [NoNextPosture("", stances, k).missing(blocks) for k in (lift - 1, lift, down, down + 1, down + 2)]
+    assert named == [(name, 0) for name in 3 * ["single_right"] + 2 * ["single_left"]]
 
 
 def test_whoever_sits_bends_the_hip_whatever_the_file_says_and_this_is_said() -> None:

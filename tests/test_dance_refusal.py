@@ -92,13 +92,28 @@ def test_what_is_not_possible_is_left_out_and_the_rest_is_kept() -> None:
     stances = support_sequence(BODY, PLAN)
     on = [(one.name, one.over) for one in stances]
     third, single = NoNextPosture("too weak", stances, 2), on.index(("single_right", None))
-    assert third.possible(PLAN.blocks) == (("parallel", 2), ("single_right", 2))
+    assert third.possible(PLAN.blocks, PLAN.blocks) == (("parallel", 2), ("single_right", 2))
     assert third.note(PLAN.blocks) == "Left out: 2 of the 4 postures parallel; too weak."
     lifted = NoNextPosture("too weak", stances, single)
-    assert lifted.possible(PLAN.blocks) == (("parallel", 4),)
+    assert lifted.possible(PLAN.blocks, PLAN.blocks) == (("parallel", 4),)
     assert lifted.note(PLAN.blocks) == "Left out: all 2 postures single right; too weak."
-    assert NoNextPosture("", stances, single + 1).possible(PLAN.blocks) == (("parallel", 4), ("single_right", 1))
-    assert NoNextPosture("", stances, 0).possible(PLAN.blocks) == (("single_right", 2),)
+    assert NoNextPosture("", stances, single + 1).possible(PLAN.blocks, PLAN.blocks) == (
+        ("parallel", 4),
+        ("single_right", 1),
+    )
+    assert NoNextPosture("", stances, 0).possible(PLAN.blocks, PLAN.blocks) == (("single_right", 2),)
+
+
+def test_postures_that_whoever_cannot_step_dances_on_the_first_feet_are_left_out_by_themselves() -> None:
+    """Of ten postures side by side three are danced, so that the cards are few; four of the other foot ahead follow."""
+    blocks = (("parallel", 3), ("single_right", 3), ("right_forward", 4))
+    stances = support_sequence(BODY, replace(PLAN, blocks=blocks, alone=("right",)))
+    assert {one.name for one in stances} == {"parallel", "single_right"}
+    planned, (*_, last) = (("parallel", 10), *blocks[1:]), range(len(stances))
+    stuck, later = NoNextPosture("too near", stances, last - 3), NoNextPosture("too near", stances, last)
+    assert stuck.possible(planned, blocks) == planned[:2]
+    assert stuck.note(blocks) == "Left out: all 4 postures right forward; too near."
+    assert later.possible(planned, blocks) == (*planned[:2], ("right_forward", 3))
 
 
 def test_a_dance_of_more_postures_than_there_are_is_shorter_and_not_refused(monkeypatch: pytest.MonkeyPatch) -> None:

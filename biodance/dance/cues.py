@@ -5,7 +5,7 @@ Only what moves is said, largest first, pairs together (right and left; trunk an
 rounded to what a person can follow; what goes beyond ``MOST`` things is said after them, so that nothing is left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 
 import numpy as np
@@ -30,7 +30,8 @@ PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
 """Beginnings of the names of the joints of the right and of the left arm."""
-_LIFTED = ("shoulder_flexion", "shoulder_adduction")  # Movements whose right angle is shoulder height
+_OUT = -60.0  # degrees of shoulder_adduction from which an arm is held out to the side
+_LIFTED = ("shoulder_flexion", "arm_front", "shoulder_adduction")  # Movements whose right angle is shoulder height
 REST = "Then rest: let free arms down. Take up this posture again when you are ready."
 """What is called where the person rests (`rests`)."""
 _PLURAL = {"foot": "feet"}
@@ -62,7 +63,7 @@ CueWords = tuple[str, str, str, str]
 
 @cache
 def _words(group: str) -> dict[str, CueWords]:
-    """Return the words of the ``joints`` or of the ``hips``: ``protocols/vocabulary/cues.toml``."""
+    """Return the words of the ``joints``, of ``arms_out`` or of the ``hips``: ``protocols/vocabulary/cues.toml``."""
     return {name: tuple(words) for name, words in read_toml(locate("protocols/vocabulary", "cues"))[group].items()}
 
 
@@ -129,9 +130,9 @@ def calls(
     their turn to the left, drop to the right and tilt forward (3,) degrees before and after; as one may ``say`` it.
     """
     changes = {
-        joint.name: (float(b), float(a))
-        for joint, b, a in zip(body.joints, before, after, strict=True)
-        if abs(a - b) >= _SMALLEST and not _follows(joint.name, planted)
+        called: (start, end)
+        for name, called, start, end in _movements(body, before, after)
+        if abs(end - start) >= _SMALLEST and not _follows(name, planted)
     }
     whole_body = _words("hips")
     least = dict.fromkeys(whole_body, _SMALLEST)
@@ -162,6 +163,18 @@ def calls(
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
         found.append((abs(end - start), _call(movement, "both" if pair else side, start, end, say)))
     return tuple(text for _, text in sorted(found, key=lambda call: -call[0]))
+
+
+def _movements(body: Body, before: Array, after: Array) -> Iterator[tuple[str, str, float, float]]:
+    """Yield of every joint its name, the one of its words, and its angle before and after, degrees: flexion of a
+    shoulder turns an arm that is held out about itself.
+    """
+    angles = {joint.name: (float(b), float(a)) for joint, b, a in zip(body.joints, before, after, strict=True)}
+    for name, ends in angles.items():
+        side, movement = _split(name)
+        was, now = (angle <= _OUT for angle in angles.get(f"{side}_shoulder_adduction", (0.0, 0.0)))
+        turned = movement == "shoulder_flexion" and now
+        yield name, f"{side}_{'forearm_turn' if was else 'arm_front'}" if turned else name, *ends
 
 
 def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
@@ -248,7 +261,7 @@ def _is_leg(movement: str) -> bool:
 
 
 def _call(movement: str, side: str, start: float, angle: float, say: Say) -> str:
-    part, positive, negative, none = (_words("joints") | _words("hips"))[movement]
+    part, positive, negative, none = (_words("joints") | _words("arms_out") | _words("hips"))[movement]
     limbs = f"both {_PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
     whole = say(limbs) if part else ""
     rounded = _rounded(angle)

@@ -19,7 +19,7 @@ from biodance.errors import BiodanceError, MissingLibrary
 from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Motion, Wrench
-from biodance.spatial import quaternion_matrix, wrench_about_origin, wrench_about_point, wrench_of_force
+from biodance.spatial import quaternion_matrix, wrench_about_origin, wrench_about_point
 
 _STEP = 0.00025
 """s, of the simulation: at 1 and 0.5 ms stiff legs ring on the floor and topple postures that stand at 0.25 ms."""
@@ -177,7 +177,7 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
         if frame:
             _advance(mujoco, driver, data, motion, torque, frame)
         q = np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[driver.q_place]])  # Pinocchio's order
-        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), q))
+        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(data), q))
         for part in driver.touching(data):
             touched.setdefault(part, float(motion.time[frame]))
         if data.qpos[2] < FALLEN * motion.q[frame, 2]:
@@ -191,13 +191,10 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
 def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: Array, frame: int) -> None:
     """Simulate from the frame before to ``frame``; the plan is followed linearly in between."""
     steps = max(1, round((motion.time[frame] - motion.time[frame - 1]) / _STEP))
-    joints = len(driver.body.joints)
-    for k in range(steps):
-        share = k / steps
-        q, v, tau = (
-            (1 - share) * x[frame - 1] + share * x[frame]
-            for x in (motion.q[:, -joints:], motion.v[:, -joints:], torque)
-        )
+    joints, share = len(driver.body.joints), np.arange(steps)[:, None] / steps
+    planned = (motion.q[:, -joints:], motion.v[:, -joints:], torque)
+    ways = [(1 - share) * x[frame - 1] + share * x[frame] for x in planned]
+    for q, v, tau in zip(*ways, strict=True):
         driver.drive(data, q, v, tau)
         mujoco.mj_step(driver.model, data)
 
@@ -231,8 +228,8 @@ class _Driver:
     def touching(self, data: Any) -> set[str]:
         """Return the segments that are no feet and touch the floor."""
         feet = {self.body.segments[foot.segment] for foot in self.body.feet.values()}
-        found = {self.model.body(self.model.geom_bodyid[geom]).name for one in data.contact for geom in one.geom}
-        return found - feet - {"world"}
+        bodies = np.unique(self.model.geom_bodyid[data.contact.geom])
+        return {self.model.body(one).name for one in bodies} - feet - {"world"}
 
     def gap(self, data: Any, q: Array) -> tuple[Array, float, float]:
         """Return the distances from the plan: joint angles (n,) rad, root m, root's tilt rad."""
@@ -242,16 +239,11 @@ class _Driver:
         return data.qpos[self.q_place] - q[7:], float(np.linalg.norm(data.qpos[:3] - q[:3])), float(np.arccos(cosine))
 
 
-def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
-    """Return the wrench (6,) of all contacts on the body about the lab origin, N and N·m."""
-    total, local = np.zeros(6), np.zeros(6)
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        mujoco.mj_contactForce(model, data, i, local)
-        # Rows of `frame` are the contact's axes in the world.
-        force = contact.frame.reshape(3, 3).T @ local[:3]
-        total += wrench_of_force(force, contact.pos)
-    return total
+def _floor_wrench(data: Any) -> Array:
+    """Return the wrench (6,) of all contacts on the body about the lab origin, N and N·m: what constrains its root."""
+    # a free root's generalised force: along the world's axes, then about the root's own (body 1; 0 is the world)
+    force, moment = data.qfrc_constraint[:3], data.xmat[1].reshape(3, 3) @ data.qfrc_constraint[3:6]
+    return wrench_about_origin(np.concatenate([force, moment]), data.xpos[1])
 
 
 _RATE = 100.0  # Hz at which plan and playback are compared

@@ -4,7 +4,7 @@
 
 from base64 import b64encode
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
-from biodance.body.solids import box_solid, shape_parts
+from biodance.body.solids import ROUNDNESS, shape_parts
 from biodance.dance.problem.stance import SEAT_TO_HIP, Stance
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.validation import TrialValidation
@@ -98,24 +98,29 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     return np.stack([np.stack(line[:2], axis=1) for line in lines], axis=1), tuple(line[2] for line in lines)
 
 
-@lru_cache(maxsize=64)
-def _solid_points(box: bytes) -> Array:
-    """Return the points (V, 3) m of the solid that fills a box (2, 3) m, given by its bytes."""
-    return np.asarray(box_solid(np.frombuffer(box).reshape(2, 3)).vertices)
+_AROUND = 48
+"""Points of an outline."""
 
 
-def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[str, Array, float]]:
-    """Return by segment what ``eye`` sees of a posture (nq,): outline (n, 2) m, across and up, and how near, m."""
-    from scipy.spatial import ConvexHull
+def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[str, Array, Array]]:
+    """Return by segment what ``eye`` sees of postures (T, nq): outlines (T, n, 2) m, across and up, how near (T,) m.
 
+    An outline joins the points in which the solid of a box (`body.solids`) touches lines of every direction.
+    """
     pose, out = poses(body, q), []
-    toward = np.array([*eye, 0.0])
+    angle = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
     # rows: across is the horizontal at right angles to the eye's direction, up is the lab's z
     seen = np.array([[-eye[1], eye[0], 0.0], [0.0, 0.0, 1.0]])
-    for segment, box in shape_parts(body):
-        points = _solid_points(box.tobytes()) @ pose.rotation[0, segment].T + pose.position[0, segment]
-        flat = points @ seen.T
-        out.append((body.segments[segment], flat[ConvexHull(flat).vertices], float((points @ toward).mean())))
+    outward = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ seen
+    for segment, (low, high) in shape_parts(body):
+        turn, half = pose.rotation[:, segment], (high - low) / 2
+        # largest g y where the p-norm of y is 1: y = sign(g) |g|^(1/(p-1)) over its p-norm, g the direction times half
+        slope = outward @ turn * half
+        touch = np.sign(slope) * np.abs(slope) ** (1 / (ROUNDNESS - 1))
+        touch *= half / (np.abs(touch) ** ROUNDNESS).sum(axis=2, keepdims=True) ** (1 / ROUNDNESS)
+        middle = turn @ ((low + high) / 2) + pose.position[:, segment]
+        outline = (touch @ turn.transpose(0, 2, 1) + middle[:, None]) @ seen.T
+        out.append((body.segments[segment], outline, middle @ np.array([*eye, 0.0])))
     return out
 
 
@@ -264,7 +269,7 @@ def asked_posture(body: Body, segment: str) -> Array:
     # The sum of the angles from pelvis to foot is zero where the sole is flat: the pelvis leans by what they lack.
     lean = asked.get("hip_flexion", 0.0) - asked.get("knee_flexion", 0.0) + asked.get("ankle_dorsiflexion", 0.0)
     q[3:7] = (Rotation.from_euler("y", lean, degrees=True) * Rotation.from_quat(q[3:7])).as_quat()
-    q[2] -= min(outline[:, 1].min() for _, outline, _ in silhouettes(body, q, (1.0, 0.0)))
+    q[2] -= min(outline[..., 1].min() for _, outline, _ in silhouettes(body, q, (1.0, 0.0)))
     return q
 
 

@@ -48,11 +48,11 @@ def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS, stance
     read to who cannot see it.
     """
     views = [(words, silhouettes(body, q, eye), props(stance, eye)) for words, eye in eyes]
-    height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
+    height = max(float(outline[..., 1].max()) for _, outline, _ in views[0][1])
     # the first view's height fills the picture; a small robot or a child stays smaller than that
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
     for words, parts, lines in views:
-        across = np.concatenate([outline[:, 0] for outline in (*(part[1] for part in parts), *lines)])
+        across = np.concatenate([outline[:, 0] for outline in (*(part[1][0] for part in parts), *lines)])
         wide = scale * float(np.ptp(across))
         room = max(wide, _LABEL)
         start = left + (room - wide) / 2 - scale * float(across.min())
@@ -61,7 +61,7 @@ def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS, stance
             return " ".join(f"{start + scale * u:.1f},{_TALL - scale * z:.1f}" for u, z in points)
 
         drawn += [f'<polyline points="{path(line)}" fill="none" stroke="#46535f" stroke-width="2"/>' for line in lines]
-        for name, outline, _ in sorted(parts, key=lambda one: one[2]):
+        for name, (outline,), _ in sorted(parts, key=lambda one: float(one[2][0])):
             side = name.partition("_")[0]
             colour = _MIDDLE if side not in SIDE_COLOURS or side == "middle" else SIDE_COLOURS[side][0]
             drawn.append(f'<polygon points="{path(outline)}" fill="{colour}"/>')

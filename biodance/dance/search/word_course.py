@@ -59,9 +59,7 @@ _Blocks = tuple[tuple[str, int], ...]  # Feet, and how many postures on them (`P
 
 
 class NoNextPosture(BiodanceError):
-    """No posture follows on the feet ``stances[number]``, and ``why``; ``stance``, of what is danced, needs that change
-    of feet, and ``reached`` of its postures are there before it.
-    """
+    """No posture follows on the feet ``stances[number]``, and ``why``."""
 
     def __init__(self, why: str, stances: tuple[Stance, ...], number: int) -> None:
         here = stances[number]
@@ -70,24 +68,35 @@ class NoNextPosture(BiodanceError):
             if number
             else f"No posture {stance_words(here)} is possible: {why}."
         )
-        self.why = why
-        before, after = stances[:number][-1:], [one for one in stances[number:] if one.over is None]
-        alone = [one for one in before if len(one.planted) == 1 and here.over is not None]
-        self.stance = (alone or after or stances[:1])[0].name
-        self.reached = sum(one.over is None and one.name == self.stance for one in stances[:number])
-        if here.over is not None or here.name != self.stance:
-            self.reached = 0  # its feet cannot be left, or not be reached
+        self.why, self.stances, self.number = why, stances, number
 
-    def possible(self, blocks: _Blocks) -> _Blocks:
-        """Return the blocks of a plan without postures that are not possible; empty where these are no part of it."""
-        shorter = [(name, self.reached if name == self.stance else count) for name, count in blocks]
-        return tuple((name, count) for name, count in shorter if count) if tuple(shorter) != blocks else ()
+    def missing(self, danced: _Blocks) -> tuple[str, int]:
+        """Return of the ``danced`` blocks (each of the `stances` that is over no foot is one of their postures) the one
+        that is not possible, and how many of its postures are there before; none where its feet cannot be left or not
+        be reached.
+        """
+        number, changes = self.number, self.stances[self.number].over is not None
+        names = iter([name for name, count in danced for _ in range(count)])
+        owner = [next(names) if one.over is None else "" for one in self.stances]
+        if changes and len(self.stances[number - 1].planted) == 1:
+            return owner[number - 1], 0
+        name = next(filter(None, owner[number:]), owner[0])
+        return name, 0 if changes else owner[:number].count(name)
 
-    def note(self, blocks: _Blocks) -> str:
-        """Return in a sentence what of the blocks of a plan is left out, and why."""
-        count = dict(blocks)[self.stance]
-        out = f"{count - self.reached} of the {count} postures" if self.reached else f"all {count} postures"
-        return f"Left out: {out} {self.stance.replace('_', ' ')}; {self.why}."
+    def possible(self, blocks: _Blocks, danced: _Blocks) -> _Blocks:
+        """Return the blocks of a plan, of which so many were ``danced``, without postures that are not possible; empty
+        where that leaves nothing out.
+        """
+        name, reached = self.missing(danced)
+        shorter = [(one, reached if one == name else count) for one, count in blocks]
+        return tuple((one, count) for one, count in shorter if count) if tuple(shorter) != blocks else ()
+
+    def note(self, danced: _Blocks) -> str:
+        """Return in a sentence what of the ``danced`` blocks is left out, and why."""
+        name, reached = self.missing(danced)
+        count = dict(danced)[name]
+        out = f"{count - reached} of the {count} postures" if reached else f"all {count} postures"
+        return f"Left out: {out} {name.replace('_', ' ')}; {self.why}."
 
 
 _INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
@@ -371,7 +380,7 @@ def word_course(search: WordSearch) -> Course:
         try:
             course = search.course(support_sequence(body, short))
         except NoNextPosture as why:
-            blocks = why.possible(plan.blocks)
+            blocks = why.possible(plan.blocks, short.blocks)
             if sum(count for _, count in blocks) < LEAST:
                 raise
             notes.append(why.note(short.blocks))

@@ -2,6 +2,9 @@
 
 import shutil
 import subprocess
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -162,59 +165,70 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     played, body = found.playback, found.dance.body
     rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / _RATE)))
     plan = found.dance.motion(played.wrench.rate).q[rows]
-    cop = played.wrench.cop()[rows]
+    seen = [silhouettes(body, q, eye) for q in (plan, played.q[rows]) for _, eye in _VIEWS]
     # the tallest posture fits into the picture, and the widest: arms overhead, a leg lifted to the side
-    shown = [silhouettes(body, q, eye) for q in plan[:: max(1, len(plan) // 60)] for _, eye in _VIEWS]
-    wide, tall = np.max([np.abs(outline).max(axis=0) for parts in shown for _, outline, _ in parts], axis=0)
+    planned = [outline for parts in seen[: len(_VIEWS)] for _, outline, _ in parts]
+    wide, tall = np.max([np.abs(outline).max(axis=(0, 1)) for outline in planned], axis=0)
     scale = min(_SCALE * _TALL / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
-    frames = [
-        _picture(body, (("planned", planned), ("played", real)), point, float(t), scale)
-        for planned, real, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)
-    ]
+    pictures = _pictures(seen, played.wrench.cop()[rows], played.time[rows], scale)
     with whole_file(out, over=True) as part:
-        _write(frames, part, out)
+        _write(pictures, part, out)
     return out
 
 
-def _write(frames: "list[Image]", part: Path, out: Path) -> None:
-    """Write pictures as the film ``out`` under the name ``part``."""
+def _write(pictures: "Iterator[Image]", part: Path, out: Path) -> None:
+    """Write pictures, as they come, as the film ``out`` under the name ``part``."""
     from PIL import Image
 
+    first = next(pictures)
     if out.suffix.lower() == ".gif":
-        colours = frames[0].quantize(48)
-        small = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
-        small[0].save(part, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
+        colours = first.quantize(48)
+        small = (frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in pictures)
+        colours.save(part, save_all=True, append_images=small, duration=round(1000 / _RATE), loop=0)
         return
-    size, form = f"{frames[0].width}x{frames[0].height}", "-y -loglevel error -f rawvideo -pix_fmt rgb24"
+    size, form = f"{first.width}x{first.height}", "-y -loglevel error -f rawvideo -pix_fmt rgb24"
     words = ["ffmpeg", *f"{form} -s {size} -r {_RATE} -i - -pix_fmt yuv420p".split(), str(part)]
-    done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
-    if done.returncode:
-        raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        with suppress(BrokenPipeError):  # it ended before the last picture, and says why
+            for picture in chain([first], pictures):
+                encoder.stdin.write(picture.tobytes())
+        said = encoder.communicate()[1]
+    if encoder.returncode:
+        raise BiodanceError(f"{out}: ffmpeg could not write it ({said.decode(errors='replace').strip()[:200]}).")
 
 
-def _picture(body: Body, bodies: tuple[tuple[str, Array], ...], cop: Array, time: float, scale: float) -> "Image":
-    """Return one instant: bodies (title, posture) from both eyes, the plan pale, pressure red, ``scale`` px per m."""
+def _pictures(seen: list[list[tuple[str, Array, Array]]], cop: Array, time: Array, scale: float) -> "Iterator[Image]":
+    """Yield the instants of ``time`` s: what is ``seen`` (`silhouettes`) by both eyes of the plan, pale, then of what
+    was played, with its pressure (T, 3) m in red; ``scale`` px per m.
+    """
     from PIL import Image, ImageDraw
 
-    width, height = _SIZE[0] * _FINE, _SIZE[1] * _FINE
-    image = Image.new("RGB", (width * len(bodies) * len(_VIEWS), height), "white")
-    draw, left = ImageDraw.Draw(image), 0
-    for title, q in bodies:
-        for view, eye in _VIEWS:
-            middle, across = left + width / 2, np.array([-eye[1], eye[0]])
-
-            def at(u: float, z: float, *, middle: float = middle) -> tuple[float, float]:
-                return middle + _FINE * scale * u, _FINE * (_FLOOR - scale * z)
-
-            draw.line([(left + 16, at(0, 0)[1]), (left + width - 16, at(0, 0)[1])], fill=(120, 120, 120), width=4)
-            for segment, outline, _ in sorted(silhouettes(body, q, eye), key=lambda one: one[2]):
-                ink = _INK[side_in_name(segment)]
-                red, green, blue = (round(one + _PALE * (255 - one)) if (title == bodies[0][0]) else one for one in ink)
-                draw.polygon([at(u, z) for u, z in outline], fill=(red, green, blue), outline="white")
-            if title != bodies[0][0] and np.isfinite(cop).all():
-                x, y = at(float(cop[:2] @ across), 0.0)
-                draw.ellipse([x - 8, y - 8, x + 8, y + 8], fill=(204, 0, 0))
-            draw.text((left + 16, 16), f"{title}, {view}", fill="black", font_size=26)
-            left += width
-    draw.text((16, 50), f"{time:5.1f} s", fill="black", font_size=26)
-    return image.reduce(_FINE)
+    width, height, floor = _SIZE[0] * _FINE, _SIZE[1] * _FINE, _FINE * _FLOOR
+    titles = [(title, *view) for title in ("planned", "played") for view in _VIEWS]
+    middles = width * (np.arange(len(titles)) + 0.5)
+    empty = Image.new("RGB", (width * len(titles), height), "white")
+    draw = ImageDraw.Draw(empty)
+    for (title, view, _), middle in zip(titles, middles, strict=True):
+        draw.line([(middle - width / 2 + 16, floor), (middle + width / 2 - 16, floor)], fill=(120, 120, 120), width=4)
+        draw.text((middle - width / 2 + 16, 16), f"{title}, {view}", fill="black", font_size=26)
+    placed = [
+        [
+            (segment, np.array([middle, floor]) + _FINE * scale * outline * [1, -1], near)
+            for segment, outline, near in parts
+        ]
+        for parts, middle in zip(seen, middles, strict=True)
+    ]
+    for t, instant in enumerate(time):
+        image = empty.copy()
+        draw = ImageDraw.Draw(image)
+        for (title, _, eye), middle, parts in zip(titles, middles, placed, strict=True):
+            pale = _PALE if title == "planned" else 0.0
+            for segment, outline, _ in sorted(parts, key=lambda one: float(one[2][t])):
+                red, green, blue = (round(one + pale * (255 - one)) for one in _INK[side_in_name(segment)])
+                draw.polygon(outline[t].ravel().tolist(), fill=(red, green, blue), outline="white")
+            if not pale and np.isfinite(cop[t]).all():
+                x = middle + _FINE * scale * float(cop[t, :2] @ [-eye[1], eye[0]])
+                draw.ellipse([x - 8, floor - 8, x + 8, floor + 8], fill=(204, 0, 0))
+        draw.text((16, 50), f"{instant:5.1f} s", fill="black", font_size=26)
+        yield image.reduce(_FINE)

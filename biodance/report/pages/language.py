@@ -141,6 +141,7 @@ def _texts(said: str | list[str] | tuple[str, ...] | None) -> tuple[str, ...]:
 COMPOSED = (
     *(N_("both arms"), N_("the right arm"), N_("the left arm")),
     *(N_("both upper arms"), N_("the right upper arm"), N_("the left upper arm")),
+    *(N_("both forearms"), N_("the right forearm"), N_("the left forearm")),
     *(N_("both elbows"), N_("the right elbow"), N_("the left elbow")),
     *(N_("both thighs"), N_("the right thigh"), N_("the left thigh")),
     *(N_("both legs"), N_("the right leg"), N_("the left leg")),

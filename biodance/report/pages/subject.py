@@ -147,7 +147,7 @@ def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[s
     """Draw ``body`` from the front with ``labels`` (segment -> lines); white is what was not ``measured``."""
     front = silhouettes(body, _spread(body), (1.0, 0.0))
     # whole mm, and y downwards as in a picture
-    outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline, _ in front]
+    outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, (outline,), _ in front]
     marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
     middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
     for right in (True, False):
