@@ -400,9 +400,11 @@ class Worker:
 
     def stop(self) -> None:
         """Stop the run; what is at work is killed, what is done stays. Returns when nothing works any more."""
-        if self._run is not None:
-            self._run.stop.set()
-            self._at_work.result()
+        with self._lock:
+            run, at_work = self._run, self._at_work
+        if run is not None:
+            run.stop.set()
+            at_work.result()
 
     def document(self) -> dict[str, Any] | None:
         """Return how the last run stands; None before the first."""
