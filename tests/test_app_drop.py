@@ -11,6 +11,7 @@ from starlette.testclient import TestClient
 
 from biodance.app.server import window_application
 from biodance.app.sessions import Archive
+from biodance.app.window import Window
 
 PORT, TOKEN = 8124, "a-token"
 HOME = f"http://127.0.0.1:{PORT}"
@@ -25,7 +26,7 @@ def archive(tmp_path: Path) -> Archive:
 
 @pytest.fixture
 def user(archive: Archive) -> Iterator[TestClient]:
-    application = window_application(archive, token=TOKEN, port=PORT)
+    application = window_application(Window(archive), token=TOKEN, port=PORT)
     with TestClient(application, base_url=HOME, follow_redirects=False) as client:
         client.get(f"/?token={TOKEN}")
         yield client

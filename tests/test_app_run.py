@@ -1,6 +1,8 @@
 """Runs that a window asks for: one at a time, followed by their log, killed whole when they are stopped."""
 
 import fcntl
+import os
+import signal
 import time
 from pathlib import Path
 
@@ -97,6 +99,21 @@ def test_a_stop_kills_what_is_at_work_and_leaves_nothing_half_done(archive):
     assert archive["s0"].found() is None
     worker.start([archive["s0"]])
     assert ended(worker)["state"] is RunState.FINISHED
+
+
+def test_a_process_made_ready_does_every_run_and_is_replaced_once_it_was_killed(archive):
+    worker = Worker(archive, count)
+    worker.make_ready()
+    for name in ("s0", "s1"):
+        worker.start([archive[name]])
+        assert ended(worker)["done"] == 1
+    first, second = (int((archive[name].folder / "worked.log").read_text()) for name in ("s0", "s1"))
+    assert first == second
+    os.kill(first, signal.SIGKILL)
+    worker.start([archive["s2"]])
+    told = ended(worker)
+    assert (told["state"], told["done"], told["why"]) == (RunState.FINISHED, 1, "")
+    assert archive["s2"].found()["status"] == "done"
 
 
 def test_while_a_batch_writes_there_a_run_says_so(archive):

@@ -15,6 +15,7 @@ from starlette.testclient import TestClient
 
 from biodance.app.server import LARGEST_BODY, POLICY, serve_window, window_application
 from biodance.app.sessions import Archive
+from biodance.app.window import Window
 from biodance.errors import BiodanceError
 from biodance.library import names
 
@@ -34,7 +35,7 @@ def archive(tmp_path: Path) -> Archive:
 
 @pytest.fixture
 def stranger(archive: Archive) -> Iterator[TestClient]:
-    application = window_application(archive, token=TOKEN, port=PORT)
+    application = window_application(Window(archive), token=TOKEN, port=PORT)
     with TestClient(application, base_url=HOME, follow_redirects=False) as client:
         yield client
 

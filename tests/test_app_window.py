@@ -297,6 +297,13 @@ def test_a_dropped_folder_is_copied_run_and_its_page_shown(browser, archive, tmp
         browser.send("Input.dispatchDragEvent", type=kind, x=500, y=500, data=data)
     browser.until("location.hash === '#/S07/gait'", 30)
     browser.until("Boolean(document.querySelector('iframe'))", 240)
+    # what is dropped over the page of results comes to the window, too: it passes the window's own part on its way
+    (tmp_path / "nothing").mkdir()
+    (tmp_path / "nothing" / "notes.txt").write_text("no recording")
+    data["files"] = [str(tmp_path / "nothing")]
+    for kind, y in (("dragEnter", 5), ("dragOver", 5), ("dragOver", 500), ("drop", 500)):
+        browser.send("Input.dispatchDragEvent", type=kind, x=500, y=y, data=data)
+    browser.until("document.querySelector('#said').textContent.includes('nothing')", 30)
     copy = archive.with_name(f"{archive.name}-results") / "dropped" / "S07"
     assert (copy / "squat_1.c3d").read_bytes() == (stick / "squat_1.c3d").read_bytes()
     assert complaints(browser, "main > :not(#panel)") == []

@@ -4,10 +4,12 @@ network.
 
 import importlib.util
 import re
+import shutil
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from browser import BROWSER, Page
 
 DOCS = Path(__file__).parents[1] / "docs"
 RECORDS = sorted((DOCS / "decisions").glob("2*.md"))
@@ -28,6 +30,39 @@ def hook(name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_the_search_of_the_site_answers_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two pages under the site's own theme, plugins and scripts: the whole site takes a minute."""
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install '.[docs]'")
+    from mkdocs.commands.build import build
+    from mkdocs.config import load_config
+
+    monkeypatch.setenv("NO_MKDOCS_2_WARNING", "1")
+    docs, site = tmp_path / "docs", tmp_path / "site"
+    (docs / "guide").mkdir(parents=True)
+    (docs / "index.md").write_text("# First\n\nNothing.\n")
+    (docs / "guide" / "gait.md").write_text("# Gait\n\nMargin of stability.\n")
+    for name in ("site.css", "iframe-worker.js"):
+        shutil.copy(DOCS / name, docs)
+    own = {"nav": ["index.md", "guide/gait.md"], "plugins": ["search", "offline"], "exclude_docs": ""}
+    own |= {"hooks": [str(DOCS / "hooks" / "offline.py")], "docs_dir": str(docs), "site_dir": str(site)}
+    build(load_config(str(DOCS.parent / "mkdocs.yml"), **own))
+    results = "[...document.querySelectorAll('.md-search-result__item a')].map((one) => one.href)"
+    for name in ("index.html", "guide/gait.html"):
+        with Page((site / name).as_uri()) as browser:
+            x, y = browser.run(
+                "(({x, y, width}) => [x + width / 2, y + 5])(document.querySelector("
+                "'[data-md-component=search-query]').getBoundingClientRect())"
+            )
+            for kind in ("mousePressed", "mouseReleased"):
+                browser.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            browser.until("typeof __index !== 'undefined'", 60)
+            for letter in "stability":
+                browser.key(letter)
+            (found,) = {one.split("#")[0].split("?")[0] for one in browser.until(f"{results}.length && {results}", 60)}
+            assert found == (site / "guide" / "gait.html").as_uri()
 
 
 @pytest.mark.parametrize("path", RECORDS, ids=lambda path: path.stem)

@@ -63,7 +63,7 @@ def _of_a_session(folder: Path) -> dict[str, Path]:
     for name in ("report", "diagnose"):
         (folder / name).mkdir()
     write_session(result, found, folder / "report")
-    write_diagnosis(result, found, folder / "diagnose", accepted=False)
+    write_diagnosis(result, found, folder / "diagnose")
     pages = {name: folder / name / "report.html" for name in ("report", "diagnose")}
     for name, text in (
         ("refused", html_of(refused_session())),

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from browser import BROWSER, Page
 
+from biodance.cli import run
+from biodance.cli.shared import DONE, NEEDS_A_PERSON
 from biodance.display import BLUE
 from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.pages.template import template_text
@@ -45,6 +47,31 @@ def test_bars_and_legends_are_printed_with_their_colours(tmp_path):
         browser.send("Emulation.setEmulatedMedia", media="print")
         for one in (".bars i", ".swatch", ".heat td"):
             assert browser.run(f"getComputedStyle(document.querySelector('{one}')).printColorAdjust") == "exact"
+
+
+VISIBLE = """(() => {
+    const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), shown = [];
+    while (walk.nextNode()) {
+        const of = walk.currentNode.parentElement;
+        if (of.closest("svg, script, style, canvas") || !of.checkVisibility({visibilityProperty: true})) continue;
+        if (of.closest("details:not([open])") && !of.closest("summary")) continue;
+        shown.push(...walk.currentNode.textContent.split(/\\s+/).filter((word) => /[\\p{L}\\p{N}]/u.test(word)));
+    }
+    return shown.length;
+})()"""
+"""Words and numbers that are seen before anything is unfolded, but for those in figures."""
+WIDER = """[...document.querySelectorAll("main table")].filter((one) => one.checkVisibility() &&
+    one.getBoundingClientRect().right > document.querySelector("main").getBoundingClientRect().right + 1).length"""
+
+
+def test_five_walks_are_900_words_and_six_printed_pages_and_no_table_leaves_the_column(data, tmp_path):
+    assert run(["report", str(data / "c3d_parser_Sydney"), "--out", str(tmp_path / "out")]) in (DONE, NEEDS_A_PERSON)
+    with Page((tmp_path / "out" / "report.html").as_uri(), size="1280,900") as browser:
+        assert 300 < browser.run(VISIBLE) <= 900
+        pdf = base64.b64decode(browser.send("Page.printToPDF", preferCSSPageSize=True)["data"])
+        assert 1 <= pdf.count(b"/Type /Page\n") <= 6
+        browser.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+        assert browser.run(WIDER) == 0
 
 
 def test_nine_cards_fit_a_printed_page(tmp_path):

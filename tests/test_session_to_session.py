@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_faults import hidden
 from identified_sessions import SUBJECT, body, session_result
 from plate_trials import CORNERS, POINT, trial
 from small_dances import small_dance
@@ -18,6 +19,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Ga
 from biodance.effects import QualityCheck
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.identification import identify_body
+from biodance.lab.session.results_folder import check_results
 from biodance.pipeline.body import starting_from
 from biodance.pipeline.front_dance import virtual_subject
 from biodance.pipeline.results import MendedCopy, SessionDiagnosis
@@ -65,6 +67,28 @@ def test_identify_says_how_well_it_was_danced(danced: Path, capsys: pytest.Captu
     assert len(rows) == 12
     assert 0 < rows["left_upper_arm"]["reached"] < 1
     assert rows["left_upper_arm"]["planned"] > rows["right_upper_arm"]["planned"]
+
+
+def test_one_report_says_how_it_was_danced_and_accepts_what_is_proven(
+    danced: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
+    monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
+    words = ["report", str(danced / "visit"), "--dance", str(danced / "dance.npz"), "--accept"]
+    assert run([*words, "--out", str(tmp_path / "out"), "--json"]) in (0, 1)
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["identification"]["performance"]["excitation"]) == 12
+    assert told["accepted"]["written"] == []
+    late = hidden(tmp_path / "late", "time_delay:delay=0.025", trials=("static", "move_1", "move_3"))
+    assert run(["report", str(late), "--accept", "--out", str(tmp_path / "late_out")]) == 1
+    told = json.loads((tmp_path / "late_out" / "results.json").read_text())["accepted"]
+    files = [one["file"] for one in told["written"]]
+    assert {"accepted/body.json", "accepted/lab.toml", "accepted/corrected/move_1.c3d"} <= {*files}
+    assert all((tmp_path / "late_out" / file).is_file() for file in files)
+    kept = check_results(tmp_path / "late_out")
+    assert kept is not None
+    assert kept.whole
+    assert {*files} <= kept.manifest.outputs.keys()
+    assert "written: accepted/lab.toml" in capsys.readouterr().out
 
 
 def test_who_dances_must_be_known() -> None:

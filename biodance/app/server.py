@@ -115,12 +115,12 @@ _PATIENCE_DROP = 600.0  # s that a dropped folder may take to arrive
 _KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
-def window_application(archive: Archive, *, token: str, port: int) -> LoopbackGuard:
-    """Return the application that serves a window over an ``archive`` to who knows the ``token``, at ``port``."""
+def window_application(window: Window, *, token: str, port: int) -> LoopbackGuard:
+    """Return the application that serves a ``window`` to who knows the ``token``, at ``port``."""
     # the window's own files by name: what is not among them cannot be asked for
     folder = files("biodance.app") / "static"
     known = {one.name: one.read_bytes() for one in folder.iterdir() if Path(one.name).suffix in _KINDS}
-    window, known = Window(archive), known | {"three.js": three_js().encode()}
+    known |= {"three.js": three_js().encode()}
 
     async def static(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
@@ -217,11 +217,12 @@ def serve_window(
     BiodanceError
         There is no session, the results' folder is taken, or the port.
     """
-    archive, listener = Archive(folder, out), loopback_socket(port, "--port")
+    window, listener = Window(Archive(folder, out)), loopback_socket(port, "--port")
     token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
     address = f"http://{LOOPBACK}:{port}/?token={token}"
-    server = quiet_server(window_application(archive, token=token, port=port))
+    server = quiet_server(window_application(window, token=token, port=port))
     prepare_workers()
+    window.worker.make_ready()
     tell(address)
     if opened:
         webbrowser.open(address)

@@ -5,6 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -17,7 +18,7 @@ from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AbstractTable
 
-from biodance.batch.run import Ledger, Work, run_here, told_of_book
+from biodance.batch.run import Ledger, Work, ready_process, run_here, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
 from biodance.batch.work import (
     OUTCOME,
@@ -361,12 +362,28 @@ class SessionRun:
 
 
 class Worker:
-    """Runs sessions of an ``archive``, one run at a time; ``work`` what is done with each, for tests."""
+    """Runs sessions of an ``archive``, one run at a time, in a process that stays; ``work`` what is done with each, for
+    tests.
+    """
 
     def __init__(self, archive: Archive, work: Work = process_session) -> None:
         self._archive, self._work, self._lock = archive, work, threading.Lock()
         self._run: SessionRun | None = None
-        self._thread: threading.Thread | None = None
+        self._turn, self._at_work = ThreadPoolExecutor(1), Future[None]()
+        self._idle: list[ProcessPoolExecutor] = []
+
+    def open(self, archive: Archive) -> None:
+        """Run sessions of another archive from now on."""
+        self._archive, self._run = archive, None
+
+    def make_ready(self) -> None:
+        """Let a process load all that sessions need, after the run that is at work."""
+
+        def ready() -> None:
+            if not self._idle:
+                self._idle.append(ready_process())
+
+        self._turn.submit(ready)
 
     def start(self, places: Sequence[SessionPlace]) -> None:
         """Begin a run over some sessions. Raises BiodanceError: another run is not finished."""
@@ -374,8 +391,7 @@ class Worker:
             if self.running:
                 raise BiodanceError("Another run is not finished. Wait for it, or stop it.")
             self._run = SessionRun(tuple(one.name for one in places))
-            self._thread = threading.Thread(target=self._go, args=(self._run, tuple(places)), daemon=True)
-            self._thread.start()
+            self._at_work = self._turn.submit(self._go, self._run, tuple(places))
 
     @property
     def running(self) -> bool:
@@ -384,9 +400,11 @@ class Worker:
 
     def stop(self) -> None:
         """Stop the run; what is at work is killed, what is done stays. Returns when nothing works any more."""
-        if self._run is not None and self._thread is not None:
-            self._run.stop.set()
-            self._thread.join()
+        with self._lock:
+            run, at_work = self._run, self._at_work
+        if run is not None:
+            run.stop.set()
+            at_work.result()
 
     def document(self) -> dict[str, Any] | None:
         """Return how the last run stands; None before the first."""
@@ -397,7 +415,7 @@ class Worker:
             with told_of_book(self._archive.out), closing(Ledger(self._archive.out, self._archive.folder)) as ledger:
                 clear_up(self._archive.out / SESSIONS)
                 tasks = (one.task() for one in places)
-                with closing(run_here(tasks, self._work, workers=1, stop=run.stop)) as finished:
+                with closing(run_here(tasks, self._work, workers=1, stop=run.stop, idle=self._idle)) as finished:
                     for task, outcome in finished:
                         ledger.write(outcome)
                         run.done.append(task.name)

@@ -250,7 +250,8 @@ class Window:
         with self._lock:
             self.refuse_while_running()
             archive = Archive(folder, results_beside(folder))
-            self.archive, self.worker, self._view = archive, Worker(archive), None
+            self.archive, self._view = archive, None
+            self.worker.open(archive)
         return self.listed(asked)
 
     def drop(self, asked: Asked) -> dict[str, Any]:
@@ -330,6 +331,7 @@ class Window:
     def stop(self, _: Asked) -> dict[str, Any]:
         """Stop the run."""
         self.worker.stop()
+        self.worker.make_ready()  # the process that was at work was killed
         return {"run": self.worker.document()}
 
     def page(self, asked: Asked) -> Response:

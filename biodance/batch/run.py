@@ -28,6 +28,7 @@ from biodance.batch.work import (
     Why,
     clear_up,
     fingerprint_of,
+    load_all,
     outcome_of,
     process_session,
     readable,
@@ -56,30 +57,41 @@ _ASKED = 0.2
 
 
 def run_here(
-    tasks: Iterable[SessionTask], work: Work, *, workers: int, stop: threading.Event | None = None
+    tasks: Iterable[SessionTask],
+    work: Work,
+    *,
+    workers: int,
+    stop: threading.Event | None = None,
+    idle: list[ProcessPoolExecutor] | None = None,
 ) -> Outcomes:
     """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
 
     A process that dies (killed, out of memory) is replaced and takes no other along; its session is tried again when
     all others are finished, one at a time, and given up when it has lost its process `TRIES` times. Once another
-    thread sets ``stop``, what is at work is killed and nothing more is yielded.
+    thread sets ``stop``, what is at work is killed and nothing more is yielded. ``idle`` processes are taken first
+    (`ready_process`), and all that live on stay there; without it they are ended.
     """
     lost, stop = deque[SessionTask](), stop or threading.Event()
-    yield from _beside(deque(tasks), work, workers, lost, stop)
+    yield from _beside(deque(tasks), work, workers, lost, stop, idle)
     # one at a time: what died beside others, of their memory perhaps, may get through alone
     for _ in range(TRIES - 1):
         again, lost = lost, deque[SessionTask]()
-        yield from _beside(again, work, 1, lost, stop)
+        yield from _beside(again, work, 1, lost, stop, idle)
     for task in lost:
         if not stop.is_set():
             yield task, _killed(task)
 
 
 def _beside(
-    waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask], stop: threading.Event
+    waiting: deque[SessionTask],
+    work: Work,
+    workers: int,
+    lost: deque[SessionTask],
+    stop: threading.Event,
+    idle: list[ProcessPoolExecutor] | None,
 ) -> Outcomes:
     """Yield what is finished until ``stop``; each worker is a pool of one, so that a death takes no other along."""
-    free = [_process() for _ in range(min(workers, len(waiting)))]
+    free = [idle.pop() if idle else _process() for _ in range(min(workers, len(waiting)))]
     flying = dict[Future[Outcome], tuple[SessionTask, ProcessPoolExecutor]]()
     try:
         while (waiting or flying) and not stop.is_set():
@@ -100,7 +112,9 @@ def _beside(
             for process in tuple(pool._processes.values()):
                 process.kill()
                 process.join()
-        for pool in (*free, *(pool for _, pool in flying.values())):
+        ended = [pool for _, pool in flying.values()]
+        (ended if idle is None else idle).extend(free)
+        for pool in ended:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -135,6 +149,13 @@ def _process() -> ProcessPoolExecutor:
     prepare_workers()
     context = multiprocessing.get_context("forkserver")
     return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
+
+
+def ready_process() -> ProcessPoolExecutor:
+    """Return one process, at once, that has loaded all by the time somebody asks for a session."""
+    pool = _process()
+    pool.submit(load_all)
+    return pool
 
 
 def end_with_parent() -> None:

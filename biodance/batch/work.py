@@ -140,6 +140,21 @@ def readable(path: Path | str) -> str:
     return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
+def load_all() -> None:
+    """Load what the first session of a process would wait for: the families, and numba with the machine code."""
+    from biodance.body.human.human import human
+    from biodance.effects import causes
+    from biodance.lab.readers import readers
+    from biodance.motion.kinematics import poses
+    from biodance.observations import observers
+    from biodance.records import Subject
+
+    for family in (readers, causes, observers):
+        family()
+    body = human(Subject(70.0, 1.75, "F"))
+    poses(body, body.neutral)
+
+
 PART = ".part-"
 """Beginning of the name of a folder that is still being written."""
 _LOG = "log.txt"

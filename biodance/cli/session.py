@@ -20,6 +20,18 @@ if TYPE_CHECKING:
     from biodance.settings import Settings
 
 
+_Accept = Annotated[
+    bool,
+    Parameter(
+        help="Also apply the findings that are proven to make data that were not used fit better, and write the "
+        "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed."
+    ),
+]
+_Danced = Annotated[
+    Path | None, Parameter(help="dance.npz that the person followed; reports how well it was performed.")
+]
+
+
 def report_session(
     result: "SessionResult",
     folder: Path,
@@ -29,6 +41,8 @@ def report_session(
     reference: "SessionIdentification | None" = None,
     lab: Path | None = None,
     for_subject: str | None = None,
+    dance: "Dance | None" = None,
+    accept: bool = False,
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Diagnose a session that was `followed` and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
@@ -36,17 +50,34 @@ def report_session(
     from biodance.pipeline.session import identified, stopped_before
     from biodance.report.write import write_session
 
-    found = None
+    found, carried = None, read_lab(lab)
     try:
-        known = read_lab(lab).tolerances
         if result.stopped:
             # by Ctrl-C, while trials were followed: what is there is weighed, and nothing more is looked for
             result = identified(result, reference=reference, tell=tell)
         else:
+            known = carried.tolerances
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
+        if dance is not None:
+            result = _as_danced(result, dance)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
-    return write_session(result, found, folder, tables=tables, lab=lab, for_subject=for_subject, tell=tell)
+    return write_session(
+        result, found, folder, tables=tables, lab=lab, for_subject=for_subject,
+        accept=carried.corrections if accept else None, tell=tell,
+    )  # fmt: skip
+
+
+def _as_danced(result: "SessionResult", dance: "Dance") -> "SessionResult":
+    """Return a session with how well a dance was danced; where nobody knows that, say so and tell all else."""
+    from biodance.errors import SessionRefused
+    from biodance.pipeline.front_dance import with_performance
+
+    try:
+        return with_performance(result, dance)
+    except SessionRefused as why:
+        shared.say(f"look: {why}")
+        return result
 
 
 def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -58,6 +89,15 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
         shared.say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
         return shared.STOPPED
     return exit_code(found)
+
+
+def _read_dance(file: Path | None) -> "Dance | None":
+    """Return the dance that was shown, before the long work starts; None where none was."""
+    if file is None:
+        return None
+    from biodance.dance.dance import Dance
+
+    return Dance.load(file)
 
 
 def exit_code(found: "dict[str, Any]") -> int:
@@ -120,6 +160,8 @@ def report_command(
         str | None,
         Parameter(help="Write that page in this language: en, de, or the path of a catalogue of your own (*.po)."),
     ] = None,
+    dance: _Danced = None,
+    accept: _Accept = False,
 ) -> int:
     """Process a session through all stages and write report.html and results.json.
 
@@ -135,10 +177,12 @@ def report_command(
         read_language(spoken)  # what is wrong with it is said before the long work starts
     with shared.progress() as tell:
         tables = results.make_tables_folder(session)
-        result, before, place = follow_with_reference(session, reading, results, tell)
+        shown = _read_dance(dance)
+        result, before, place = follow_with_reference(session, reading, results, tell, dance=shown)
         result, found = report_session(
-            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken
-        )
+            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken,
+            dance=shown, accept=accept,
+        )  # fmt: skip
         folder = put_session(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)
@@ -237,13 +281,7 @@ def diagnose_command(
     *,
     results: shared.Results,
     reading: shared.Reading = shared.USUAL_READING,
-    accept: Annotated[
-        bool,
-        Parameter(
-            help="Also apply the findings that are proven to make data that were not used fit better, and write the "
-            "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed."
-        ),
-    ] = False,
+    accept: _Accept = False,
     robot: shared.RobotFile = shared.NO_ROBOT,
 ) -> int:
     """Diagnose why measured and simulated ground forces differ: the causes, their sizes with uncertainty, possible
@@ -272,8 +310,8 @@ def diagnose_command(
         result, before, place = follow_with_reference(session, reading, results, tell)
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
         document = write_diagnosis(
-            result, found, place.part, accepted=accept, earlier=carried.corrections, tables=tables, lab=reading.lab,
-            tell=tell,
+            result, found, place.part, accept=carried.corrections if accept else None, tables=tables,
+            lab=reading.lab, tell=tell,
         )  # fmt: skip
         folder = put_session(place, result.session)
     results.show_page(folder)
@@ -311,10 +349,7 @@ def identify_command(
     *,
     results: shared.Results,
     reading: shared.Reading = shared.USUAL_READING,
-    dance: Annotated[
-        Path | None,
-        Parameter(help="dance.npz that the person followed; reports how well it was performed."),
-    ] = None,
+    dance: _Danced = None,
     method: Annotated[
         Literal["posterior", "paper"],
         Parameter(help="posterior: with intervals; paper: the quadratic programme of Bonnet 2016, beside it."),
@@ -333,14 +368,13 @@ def identify_command(
         given = {"--dance": dance, "--tables": results.tables, "--method": None if method == "posterior" else method}
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
-    from biodance.dance.dance import Dance
     from biodance.pipeline.front import identified_visit
     from biodance.pipeline.lab_file import read_lab
     from biodance.report.write import write_identification
 
     with shared.progress() as tell:
         tables = results.make_tables_folder(session)
-        shown = None if dance is None else Dance.load(dance)
+        shown = _read_dance(dance)
         result, before, place = follow_with_reference(session, reading, results, tell, dance=shown)
         known = read_lab(reading.lab).tolerances
         result = identified_visit(result, reference=before, tolerances=known, dance=shown, method=method, tell=tell)

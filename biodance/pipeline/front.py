@@ -21,7 +21,7 @@ from biodance.motion.soles import soles_from_body
 from biodance.motion.track import track
 from biodance.pipeline.body import body_of, refuse_another_reference
 from biodance.pipeline.diagnosis import diagnose_session, diagnosed_and_corrected
-from biodance.pipeline.front_dance import performance_of
+from biodance.pipeline.front_dance import with_performance
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
@@ -178,10 +178,8 @@ def identified_visit(
     """
     result, _ = diagnosed_and_corrected(result, reference=reference, tolerances=tolerances, tell=tell)
     result = by_paper(result) if method == "paper" else result
-    found = identification_of(result)
-    if dance is not None:
-        found = replace(found, performance=performance_of(result, dance))
-    return replace(result, identification=found)
+    identification_of(result)
+    return result if dance is None else with_performance(result, dance)
 
 
 def diagnose(

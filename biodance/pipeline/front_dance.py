@@ -34,7 +34,6 @@ from biodance.virtual_lab.simulate import simulate_session as write_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
 if TYPE_CHECKING:
-    from biodance.dance.expectation import PerformanceScore
     from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance import DanceResult
@@ -365,12 +364,14 @@ def virtual_subject(
     return Subject(float(who["mass"]), float(who["height"]), who["sex"], years)  # type: ignore[arg-type]
 
 
-def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "PerformanceScore":
-    """Return how well a dance was danced in the trials with role fit of an examined visit, and what the page that led
-    noted (`dance_log*.json` in its folder).
+def with_performance(result: "SessionResult", dance: "Dance | str | Path") -> "SessionResult":
+    """Return an identified visit with how well a dance was danced in its trials with role fit, and what the page that
+    led noted (`dance_log*.json` in its folder).
 
     Raises
     ------
+    SessionRefused
+        Nothing was identified.
     FileRefused
         The file is no dance, or a log is none.
     BiodanceError
@@ -379,12 +380,15 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     from biodance.dance.expectation import score_performance
     from biodance.dance.visit_log import read_visit_logs
     from biodance.pipeline.identification import FITTED_ROLES
+    from biodance.pipeline.session import identification_of
     from biodance.pipeline.trial import trial_fit
 
+    found = identification_of(result)
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
     if result.body is None:
         why = f"{result.placed.source} So nobody knows how the dance was danced."
         raise SessionRefused(f"{result.session.folder}: {why}")
     fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
     scored = score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
-    return replace(scored, logs=read_visit_logs(Path(result.session.folder), one))
+    scored = replace(scored, logs=read_visit_logs(Path(result.session.folder), one))
+    return replace(result, identification=replace(found, performance=scored))

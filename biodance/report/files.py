@@ -74,7 +74,10 @@ def for_spreadsheets(frame: "DataFrame") -> "DataFrame":
     """Return a table with all its texts and headings as `for_spreadsheet`."""
     from pandas.api.types import is_numeric_dtype
 
-    texts = {name: frame[name].map(for_spreadsheet) for name in frame.columns if not is_numeric_dtype(frame[name])}
+    # each text is looked at once: a trial's name stands in every frame's row
+    some = (name for name in frame.columns if not is_numeric_dtype(frame[name]))
+    formulas = (name for name in some if any(for_spreadsheet(cell) is not cell for cell in frame[name].unique()))
+    texts = {name: frame[name].map(for_spreadsheet) for name in formulas}
     return frame.assign(**texts).rename(columns=for_spreadsheet)
 
 

@@ -13,6 +13,7 @@ from biodance.display import spaced
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.plates.faults import APPLIED, PlateCorrection
+from biodance.lab.session.results_folder import made_folder
 from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import as_diagnosed
@@ -240,7 +241,7 @@ CLAUSES: tuple[MethodClause, ...] = (
 """In the order in which they are said."""
 
 
-PAGE, SUBJECT_PAGE = "report.html", "subject.html"
+PAGE, SUBJECT_PAGE, ACCEPTED = "report.html", "subject.html", "accepted"
 
 
 def write_session(
@@ -252,10 +253,14 @@ def write_session(
     lab: Path | None = None,
     for_subject: str | None = None,
     drawn: bool = True,
+    accept: tuple[PlateCorrection, ...] | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[SessionResult, dict[str, Any]]:
     """Write ``results.json``, ``methods.md`` and, where ``drawn``, ``report.html`` of a session with its diagnosis,
     ``tables``, and a page ``for_subject`` in that language; return the session as it is told, and the numbers.
+
+    With ``accept`` the folder `ACCEPTED` holds what `write_diagnosis` writes: the body beside the page is the one that
+    the page tells of, and its motions are of it.
     """
     diagnosis = found.diagnosis if found else None
     result = as_diagnosed(result, diagnosis) if diagnosis else result
@@ -276,6 +281,12 @@ def write_session(
     files = {METHODS: methods_text(told)}
     if drawn:
         files |= {PAGE: _page(result, made, first, found, moved)} | _kept(result, folder)
+    if accept is not None and found is not None:
+        place = made_folder(folder / ACCEPTED)
+        told["accepted"], more = _accepted(found.judged or result, found, place, accept)
+        for one in told["accepted"]["written"]:
+            one["file"] = f"{ACCEPTED}/{one['file']}"
+        write_files(place, more)
     return result, write_results(folder, told, files)
 
 
@@ -347,16 +358,16 @@ def write_diagnosis(
     found: SessionDiagnosis,
     folder: Path,
     *,
-    accepted: bool,
-    earlier: tuple[PlateCorrection, ...] = (),
+    accept: tuple[PlateCorrection, ...] | None = None,
     tables: Path | None = None,
     lab: Path | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Write ``report.html``, ``results.json`` and ``tables`` of a diagnosis, and return the numbers.
 
-    With ``accepted`` also what follows from the findings that are proven to gain: ``body.json``, ``lab.toml`` (with the
-    corrections made ``earlier``), the trials corrected, and copies of recordings with their labels put right.
+    With ``accept``, the corrections made earlier, also what follows from the findings that are proven to gain:
+    ``body.json``, ``lab.toml`` (with the earlier ones), the trials corrected, and copies of recordings with their
+    labels put right.
     """
     result = as_diagnosed(found.judged or result, found.diagnosis)
     moved, made = _described(result, found.diagnosis, tables, lab, tell), provenance(result, created=now())
@@ -369,8 +380,8 @@ def write_diagnosis(
         "provenance": made,
     }
     files = {PAGE: diagnosis_page(result, found, made)}
-    if accepted:
-        numbers["accepted"], more = _accepted(result, found, folder, earlier)
+    if accept is not None:
+        numbers["accepted"], more = _accepted(result, found, folder, accept)
         files |= more
     return write_results(folder, numbers, files)
 

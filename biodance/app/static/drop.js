@@ -56,10 +56,15 @@ async function takeIn(files, page) {
 export function takeDrops(page) {
   // wherever on the page; what is dragged within the page (a triangle, a mark) carries no files
   const files = (event) => event.dataTransfer?.types.includes("Files");
+  // a page of results in its frame would take the drop for itself, and nobody would answer it
+  const over = (yes) => document.body.classList.toggle("dragged", yes);
+  addEventListener("dragenter", (event) => files(event) && over(true));
+  addEventListener("dragleave", (event) => event.relatedTarget || over(false)); // it left the window
   addEventListener("dragover", (event) => files(event) && event.preventDefault());
   addEventListener("drop", async (event) => {
     if (!files(event)) return;
     event.preventDefault();
+    over(false);
     const entries = [...event.dataTransfer.items].map((one) => one.webkitGetAsEntry()).filter(Boolean);
     const found = await Promise.all(entries.map((one) => filesIn(one)));
     await takeIn(found.flat(), page);
