@@ -134,8 +134,8 @@ def print_session(result: SessionResult, found: Row, console: Console) -> None:
             # who stands still presses evenly: there is nothing to correlate but noise
             row["wrench"]["table"]["cc"] = [None] * 6
     print_table(TRIAL_ROW, rows, console)
-    if found["identification"] and found["identification"]["performance"]:
-        _print_performance(found["identification"]["performance"], console)
+    if danced := (found.get("identification") or {}).get("performance"):
+        _print_performance(danced, console)
     if "accepted" in found:
         _print_accepted(found["accepted"], console)
 
