@@ -60,8 +60,9 @@ VISIBLE = """(() => {
     return shown.length;
 })()"""
 """Words and numbers that are seen before anything is unfolded, but for those in figures."""
-WIDER = """[...document.querySelectorAll("main table")].filter((one) => one.checkVisibility() &&
-    !one.closest(".wide") && one.getBoundingClientRect().right > document.querySelector("main").getBoundingClientRect().right + 1).length"""
+WIDER = """[...document.querySelectorAll("main table")].filter((one) =>
+    one.checkVisibility() && !one.closest(".wide") &&
+    one.getBoundingClientRect().right > document.querySelector("main").getBoundingClientRect().right + 1).length"""
 """Tables beyond the column that no frame of theirs scrolls."""
 
 
