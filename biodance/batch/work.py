@@ -275,13 +275,13 @@ def _examined(
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.session import followed
     from biodance.report.tables.diagnosis import asks_nobody
-    from biodance.report.write import write_session
+    from biodance.report.write import Wanted, write_session
     from biodance.settings import assignments
 
     session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
     result, found = diagnosed_and_corrected(followed(session, tell=tell), tell=tell)
     tables = folder / TABLES if task.tables else None
-    _, document = write_session(result, found, folder, tables=tables, drawn=task.pages, tell=tell)
+    _, document = write_session(result, found, folder, Wanted(tables=tables, drawn=task.pages), tell=tell)
     first = document["attention"][0]["text"] if document["attention"] else ""
     status = SessionStatus.DONE if asks_nobody(document["attention"]) else SessionStatus.NEEDS_A_PERSON
     tell(f"{status}: {first}")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult
     from biodance.pipeline.robot import RobotResult
     from biodance.records import Session, Trial
+    from biodance.report.write import Wanted
     from biodance.settings import Settings
 
 
@@ -36,36 +37,30 @@ def report_session(
     result: "SessionResult",
     folder: Path,
     tell: "Callable[[str], None]",
+    wanted: "Wanted | None" = None,
     *,
-    tables: Path | None = None,
     reference: "SessionIdentification | None" = None,
-    lab: Path | None = None,
-    for_subject: str | None = None,
     dance: "Dance | None" = None,
-    accept: bool = False,
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Diagnose a session that was `followed` and write it (`write_session`); stopped by Ctrl-C, without a diagnosis."""
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.session import identified, stopped_before
-    from biodance.report.write import write_session
+    from biodance.report.write import Wanted, write_session
 
-    found, carried = None, read_lab(lab)
+    found, wanted = None, wanted or Wanted()
+    known = read_lab(wanted.lab).tolerances
     try:
         if result.stopped:
             # by Ctrl-C, while trials were followed: what is there is weighed, and nothing more is looked for
             result = identified(result, reference=reference, tell=tell)
         else:
-            known = carried.tolerances
             result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
         if dance is not None:
             result = _as_danced(result, dance)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
-    return write_session(
-        result, found, folder, tables=tables, lab=lab, for_subject=for_subject,
-        accept=carried.corrections if accept else None, tell=tell,
-    )  # fmt: skip
+    return write_session(result, found, folder, wanted, tell=tell)
 
 
 def _as_danced(result: "SessionResult", dance: "Dance") -> "SessionResult":
@@ -171,6 +166,7 @@ def report_command(
         Session folder: the static trial and the other trials; or one C3D file.
     """
     from biodance.report.pages.language import ENGLISH, read_language
+    from biodance.report.write import Wanted
 
     spoken = language or (ENGLISH if subject_page else None)
     if spoken:
@@ -179,10 +175,8 @@ def report_command(
         tables = results.make_tables_folder(session)
         shown = _read_dance(dance)
         result, before, place = follow_with_reference(session, reading, results, tell, dance=shown)
-        result, found = report_session(
-            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=spoken,
-            dance=shown, accept=accept,
-        )  # fmt: skip
+        wanted = Wanted(tables=tables, lab=reading.lab, for_subject=spoken, accept=accept)
+        result, found = report_session(result, place.part, tell, wanted, reference=before, dance=shown)
         folder = put_session(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)

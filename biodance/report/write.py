@@ -19,7 +19,7 @@ from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.judged_trials import failed_checks, identified_trials
-from biodance.pipeline.lab_file import LAB, lab_text
+from biodance.pipeline.lab_file import LAB, lab_text, read_lab
 from biodance.pipeline.movement import SessionMovement, account_for, describe_movement
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions, now, provenance
@@ -244,30 +244,38 @@ CLAUSES: tuple[MethodClause, ...] = (
 PAGE, SUBJECT_PAGE, ACCEPTED = "report.html", "subject.html", "accepted"
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of a report: a folder for ``tables``; a laboratory's file ``lab``, whose people are the norm;
+    a page ``for_subject`` in that language; the analyst's page, where ``drawn``; and to ``accept`` what is proven: the
+    folder `ACCEPTED` then holds what `write_diagnosis` writes, as the body beside the page is the one that the page
+    tells of, and its motions are of it.
+    """
+
+    tables: Path | None = None
+    lab: Path | None = None
+    for_subject: str | None = None
+    drawn: bool = True
+    accept: bool = False
+
+
 def write_session(
     result: SessionResult,
     found: SessionDiagnosis | None,
     folder: Path,
+    wanted: Wanted | None = None,
     *,
-    tables: Path | None = None,
-    lab: Path | None = None,
-    for_subject: str | None = None,
-    drawn: bool = True,
-    accept: tuple[PlateCorrection, ...] | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[SessionResult, dict[str, Any]]:
-    """Write ``results.json``, ``methods.md`` and, where ``drawn``, ``report.html`` of a session with its diagnosis,
-    ``tables``, and a page ``for_subject`` in that language; return the session as it is told, and the numbers.
-
-    With ``accept`` the folder `ACCEPTED` holds what `write_diagnosis` writes: the body beside the page is the one that
-    the page tells of, and its motions are of it.
+    """Write ``results.json``, ``methods.md`` and what is ``wanted`` of a session with its diagnosis; return the session
+    as it is told, and the numbers.
     """
-    diagnosis = found.diagnosis if found else None
+    wanted, diagnosis = wanted or Wanted(), found.diagnosis if found else None
     result = as_diagnosed(result, diagnosis) if diagnosis else result
-    moved = _described(result, diagnosis, tables, lab, tell)
-    tell("writing the page" if drawn else "writing")
-    if for_subject:
-        write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, found, moved), for_subject)})
+    moved = _described(result, diagnosis, wanted.tables, wanted.lab, tell)
+    tell("writing the page" if wanted.drawn else "writing")
+    if wanted.for_subject:
+        write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, found, moved), wanted.for_subject)})
     made, first = provenance(result, created=now()), session_attention(result, diagnosis)
     numbers = {
         **results_document(result, made),
@@ -279,14 +287,16 @@ def write_session(
     # the paragraph on methods says what stands in results.json, so both are made of the same values
     told: dict[str, Any] = plain_values(numbers)
     files = {METHODS: methods_text(told)}
-    if drawn:
+    if wanted.drawn:
         files |= {PAGE: _page(result, made, first, found, moved)} | _kept(result, folder)
-    if accept is not None and found is not None:
+    if wanted.accept and found is not None:
         place = made_folder(folder / ACCEPTED)
-        told["accepted"], more = _accepted(found.judged or result, found, place, accept)
+        told["accepted"], more = _accepted(found.judged or result, found, place, read_lab(wanted.lab).corrections)
         for one in told["accepted"]["written"]:
             one["file"] = f"{ACCEPTED}/{one['file']}"
         write_files(place, more)
+        if not told["accepted"]["written"]:
+            place.rmdir()
     return result, write_results(folder, told, files)
 
 
