@@ -378,7 +378,7 @@ def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers
     if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * _LEAST_BESIDE:
         return reading, ()
     other = replace(reading, vector=reading.vector * _HALF_TURN)
-    written, turned = (_distance(one, time, markers) for one in (reading, other))
+    written, turned = _distance(reading, time, markers), _distance(other, time, markers, throughout=True)
     # Beside the feet as written, under them when turned.
     if written is None or turned is None or written <= _NOT_UNDER or turned > _UNDER_THE_FOOT:
         return reading, ()
@@ -400,7 +400,7 @@ def _unmirrored(reading: PlateReading, time: Array, markers: Markers | None) -> 
         return replace(reading, axes=reading.axes * [1, 1, -1]), f"{why}; {kept}markers."
     choices = {"y": [1, -1, -1], "x": [-1, 1, -1]}
     turned = {name: replace(reading, axes=reading.axes * choice) for name, choice in choices.items()}
-    found = {name: _distance(one, time, markers) for name, one in turned.items()}
+    found = {name: _distance(one, time, markers, throughout=True) for name, one in turned.items()}
     good = [name for name, distance in found.items() if distance is not None and distance <= _UNDER_THE_FOOT]
     if len(good) != 1:
         raise TrialRefused(
