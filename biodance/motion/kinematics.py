@@ -306,6 +306,22 @@ class Chart:
         ball = continued(np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23]))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 
+    def turns(self, q: Array) -> Array:
+        """Return (n, B) how far every joint is turned in ``q`` (nq, B), B consecutive frames: the angle of a single
+        one, 2 sin(theta / 2) u of a ball joint that is turned by theta about u.
+
+        Small turns are the angles. Cardan angles jump where an arm is raised (their middle axis at a right angle); what
+        goes with a joint, as skin does, does not.
+        """
+        smooth, turns = self.smooth(q), np.empty((self.joint_count, q.shape[1]))
+        turns[self.single] = smooth.angle
+        if q.shape[1]:
+            # A quaternion and its negative are one turn: the one of less than half a turn, nearest to neutral.
+            scalar = smooth.ball[3]
+            sign = np.sign(np.take_along_axis(scalar, np.abs(scalar).argmax(axis=1)[:, None], axis=1))
+            turns[self.ball] = 2 * sign * self.sign * smooth.ball[:3]
+        return turns
+
     def split(self, stacked: Array) -> Smooth:
         """Return the parts of ``stacked`` (3 + 4 + 4 G + m, B), as they are."""
         root, count = (3, 7) if self.n_root else (0, 0), self.ball.shape[1]

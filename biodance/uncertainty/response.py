@@ -22,8 +22,16 @@ from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
-from biodance.body.parts import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
+from biodance.body.parts import rigid_inertia
+from biodance.motion.kinematics import (
+    Poses,
+    SegmentMotion,
+    chart_of,
+    place_jacobian,
+    poses,
+    segment_motion,
+    tangent_of,
+)
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -44,7 +52,8 @@ _NOTHING = 1e-17
 class Response:
     """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
 
-    ``place``, ``turn`` (F, N, 9, 3) the functionals of a segment's CoM moved and of the segment turned.
+    ``place``, ``turn`` (F, N, 9, 3) the functionals of a segment's CoM moved and of the segment turned; ``joints``
+    (F, n) how far every axis is turned (`Chart.turns`).
     """
 
     body: Body
@@ -52,15 +61,17 @@ class Response:
     pose: Poses
     place: Array
     turn: Array
+    joints: Array
 
     @classmethod
     def of(cls, body: Body, motion: Motion) -> "Response":
         """Return the response of ``body`` in ``motion``."""
-        return cls(body, motion, poses(body, motion.q), *functionals(body, motion))
+        return cls(body, motion, poses(body, motion.q), *functionals(body, motion), chart_of(body).turns(motion.q.T).T)
 
     def at(self, some: slice) -> "Response":
         """Return the response in some of the frames; its `wrench` and `back` are those of a run of its own."""
-        return Response(self.body, self.motion.at(some), self.pose.at(some), self.place[some], self.turn[some])
+        where = self.place[some], self.turn[some], self.joints[some]
+        return Response(self.body, self.motion.at(some), self.pose.at(some), *where)
 
     def parts(self) -> Iterator[tuple[slice, "Response"]]:
         """Yield the response frame by frame, so many together that what they need stays in the cache."""
@@ -113,11 +124,6 @@ class Response:
     def segments(self) -> SegmentMotion:
         """How the segments move."""
         return segment_motion(self.body, self.motion)
-
-    @property
-    def angles(self) -> Array:
-        """(F, n) rad, of the joints."""
-        return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
     def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
         """Return the functionals (F, 9, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
@@ -228,7 +234,8 @@ def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
     frames, count = motion.time.size, len(body.segments)
     mass = body.sip.mass[:, None, None]
     com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
-    inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
+    central = np.array([rigid_inertia(one).inertia for one in body.sip.phi.reshape(-1, 10)])
+    inertia = move.rotation @ central @ np.swapaxes(move.rotation, -1, -2)
     spin = (inertia @ move.angular_velocity[..., None])[..., 0]
     whirl = skew(move.angular_velocity)
     place, turn = np.zeros((2, frames, count, 9, 3))
@@ -239,17 +246,6 @@ def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
     # -L x r - I' r with I' = [w]x I - I [w]x, the rate of the inertia in lab axes.
     turn[:, :, 6:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
     return place, turn
-
-
-def central_inertia(body: Body) -> Array:
-    """Return the inertia tensors (N, 3, 3) kg·m² about the centres of mass."""
-    table, com = body.sip.phi.reshape(-1, 10), body.sip.com
-    tensor = np.empty((len(table), 3, 3))
-    for column, (i, j) in enumerate(TENSOR, start=4):
-        tensor[:, i, j] = tensor[:, j, i] = table[:, column]
-    # Parallel axes back to the CoM: I - m (|c|² 1 - c c').
-    square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
-    return np.asarray(tensor - table[:, 0, None, None] * square)
 
 
 @dataclass(frozen=True, eq=False)

@@ -140,7 +140,7 @@ class Tilt(_Carried):
         """Yield for every hinge its joint, what hangs on it, and (F, 3, 2) rad of its turn, lab, per radian of tilt."""
         for joint, hanging, across in self._hinges:
             # A hinge's axis off by e turns what hangs on it by angle * e (first order in the angle).
-            yield joint, hanging, trial.angles[:, joint, None, None] * (trial.pose.joint_rotation[:, joint] @ across)
+            yield joint, hanging, trial.joints[:, joint, None, None] * (trial.pose.joint_rotation[:, joint] @ across)
 
     @cached_property
     def _hinges(self) -> tuple[tuple[int, tuple[Index, Index], Array], ...]:
@@ -177,7 +177,7 @@ def _across(axis: Array) -> list[Array]:
 
 
 class _WithAngles(ErrorSource):
-    """Errors in proportion to the angles beside a segment: every slope times every angle."""
+    """Errors in proportion to the turns of the joints beside a segment: every slope times every turn."""
 
     @abstractmethod
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
@@ -186,7 +186,7 @@ class _WithAngles(ErrorSource):
     def functional(self, trial: Response) -> Array:
         """Return the functionals, times the angles."""
         # Slope (F, 9, P) times angle (F, n) as (F, 9, P, n), the angles last.
-        parts = [value[..., None] * trial.angles[:, None, None, near] for value, near in self._slopes(trial)]
+        parts = [value[..., None] * trial.joints[:, None, None, near] for value, near in self._slopes(trial)]
         return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
 
     def transpose(self, trial: Response, back: Array) -> Array:
@@ -195,7 +195,7 @@ class _WithAngles(ErrorSource):
         work, back = np.empty((FOUR, size)), np.ascontiguousarray(back)
         for value, near in self._slopes(trial):
             sums = np.zeros((value.shape[2], near.size, size))
-            add_products(np.ascontiguousarray(value), trial.angles.take(near, axis=1), back, work, sums)
+            add_products(np.ascontiguousarray(value), trial.joints.take(near, axis=1), back, work, sums)
             found.append(sums.reshape(-1, size))
         return np.concatenate(found)
 
@@ -221,7 +221,7 @@ class Slide(_WithAngles):
     def residual(self, trial: Response) -> Array:
         """Return the residuals of the patterns, times the angles."""
         left, cuts = self._left(trial)
-        local, angles = in_segments(trial, left), trial.angles
+        local, angles = in_segments(trial, left), trial.joints
         mean = (local.reshape(len(left), -1).T @ angles / len(left)).reshape(*local.shape[1:], angles.shape[1])
         parts = (mean[:, :, cut][..., near] for cut, (*_, near) in zip(cuts, self._parts, strict=True))
         return np.concatenate([part.reshape(*part.shape[:2], -1) for part in parts], axis=2)
@@ -234,7 +234,7 @@ class Slide(_WithAngles):
         parts = zip(cuts, self._parts, strict=True)
         # |left|² of a pattern times angle² summed over frames, over M F: mean squared distance.
         return np.concatenate(
-            [(square[:, cut].T @ trial.angles[:, near] ** 2 / count).ravel() for cut, (*_, near) in parts]
+            [(square[:, cut].T @ trial.joints[:, near] ** 2 / count).ravel() for cut, (*_, near) in parts]
         )
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
