@@ -87,9 +87,17 @@ class Statistics:
         """Add the second moments of ``rows`` (T, 6, p + 1) of [W y] at ``rate`` Hz, low-passed at ``cutoff`` Hz, in the
         first ``bands``, by default all, to the arrays.
         """
-        X, size = self.layout.bands.coefficients(self.layout.shift @ rows), self.gram.shape[-1]
+        X = self.layout.bands.coefficients(self.layout.shift @ rows)
         band = self.layout.bands.at(rate).below(cutoff).of(len(X))
-        for b in np.unique(band[(band >= 0) & (band < (len(self.gram) if bands is None else bands))]):
+        counts = (band >= 0) & (band < (len(self.gram) if bands is None else bands))
+        self.add_coefficients(X[counts], band[counts])
+
+    def add_coefficients(self, X: Array, band: NDArray[np.intp]) -> None:
+        """Add the second moments of coefficients ``X`` (m, 6, p + 1) about the layout's point, ``band`` (m,) of each,
+        to the arrays.
+        """
+        size = self.gram.shape[-1]
+        for b in np.unique(band):
             flat = X[band == b].reshape(-1, 6 * size)
             # (6, s, 6, s) to [channel, channel, s, s]; only one of each pair is kept.
             self.gram[b] += (flat.T @ flat).reshape(6, size, 6, size).swapaxes(1, 2)[PAIRS]

@@ -27,6 +27,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.mismatch import PlateRows, inverse_root, mismatch, softness
 from biodance.identification.statistics import START, WORTH, Fit, statistics, usable
+from biodance.identification.tissue import Tissue, TissueInTrial
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.spatial import wrench_about_point
@@ -109,6 +110,14 @@ def plate_readings(found: Identification, fits: tuple[Fit, ...], *bodies: Body) 
     return tuple(told)
 
 
+def tissue_beside(found: Identification, fits: tuple[Fit, ...], body: Body, plates: PlateReadings) -> Tissue:
+    """Return what the trials that were fitted tell of skin, flesh and joints beside a ``body`` and what its ``plates``
+    read.
+    """
+    used, about, _ = usable(found.body, fits)
+    return Tissue(body, used, tuple(plates.added(fit, body) for fit in used), about)
+
+
 def _rows(found: Identification, used: tuple[Fit, ...], noise: Noise, softer: float) -> PlateRows:
     """Return what the ``used`` trials tell of parameters and plates under a ``noise``, whatever the body; skin slides
     ``softer`` times as much as the table says.
@@ -149,16 +158,20 @@ class ShareRemoved:
 
 @dataclass(frozen=True)
 class ParameterGain:
-    """What the right total ``mass`` removes, and what its ``distribution`` over the segments removes of the rest."""
+    """What the right total ``mass`` removes, what its ``distribution`` over the segments removes of the rest, and of
+    what is then left skin, flesh and joints as fitted trials tell them (``tissue``; None where these told nothing).
+    """
 
     mass: ShareRemoved
     distribution: ShareRemoved
+    tissue: ShareRemoved | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class TrialValidation:
     """One trial: ``measured``, ``table`` and ``identified`` wrenches about ``about`` (3,) m, the frames ``use`` (T,)
-    compared, and how well each agrees (paper Table II, Fig. 9); ``weighed`` the mass on the plates over the table's.
+    compared, and how well each agrees (paper Table II, Fig. 9); ``weighed`` the mass on the plates over the table's;
+    ``tissue`` what skin, flesh and joints do in it, as fitted trials tell; None where these tell nothing.
     """
 
     name: str
@@ -170,6 +183,15 @@ class TrialValidation:
     table_agreement: Agreement
     identified_agreement: Agreement
     weighed: float = 1.0
+    tissue: TissueInTrial | None = None
+
+    @cached_property
+    def extended(self) -> Wrench | None:
+        """The identified wrench with what skin, flesh and joints add, about ``about``; None without ``tissue``."""
+        if self.tissue is None:
+            return None
+        added = wrench_about_point(self.tissue.added, self.about)
+        return Wrench(self.identified.time, self.identified.value + added)
 
     @cached_property
     def gain(self) -> ParameterGain:
@@ -180,7 +202,8 @@ class TrialValidation:
         identified parameters leave of it; intervals by a bootstrap over blocks of one second.
         """
         scaled = Wrench(self.table.time, self.weighed * self.table.value)
-        found = [_block_squares(self, model) for model in (self.table, scaled, self.identified)]
+        models = (self.table, scaled, self.identified, *([] if self.extended is None else [self.extended]))
+        found = [_block_squares(self, model) for model in models]
         # Channels in units of what the identified body leaves: newtons and newton metres count alike.
         unit = np.maximum(found[2].sum(axis=0), _TINY)
         blocks = np.maximum(np.stack([(squares / unit).sum(axis=1) for squares in found], axis=1), _TINY)
@@ -192,7 +215,7 @@ class TrialValidation:
             low, high = block_interval(lambda sums: removed_share(sums, first, second), blocks)
             return ShareRemoved(float(share), (float(low), float(high)))
 
-        return ParameterGain(removed(0, 1), removed(1, 2))
+        return ParameterGain(removed(0, 1), removed(1, 2), None if self.extended is None else removed(2, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,10 +247,12 @@ def validate(
     about: Array,
     mass: float | None = None,
     plates: tuple[PlateReadings, PlateReadings] | None = None,
+    tissue: Tissue | None = None,
 ) -> TrialValidation:
     """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about
     ``about`` (3,) m lab; ``mass`` kg on the plates, by default what was identified; ``plates`` what fitted trials tell
-    of their errors beside the one and the other, which its prediction holds.
+    of their errors beside the one and the other, which its prediction holds; ``tissue`` what they tell of skin, flesh
+    and joints, for the prediction that holds this as well.
 
     ``about``: the middle of the plates, or `standing_point` of the session; moments about the distant lab origin hide
     the differences.
@@ -254,6 +279,7 @@ def validate(
         compare(measured, table, fit.use),
         compare(measured, found, fit.use),
         float((mass or identified.sip.mass.sum()) / body.sip.mass.sum()),
+        None if tissue is None else TissueInTrial(tissue, fit.motion),
     )
 
 

@@ -19,7 +19,14 @@ from biodance.identification.loads import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
-from biodance.identification.validation import ResidualRatio, TrialValidation, plate_readings, residual_ratio, validate
+from biodance.identification.validation import (
+    ResidualRatio,
+    TrialValidation,
+    plate_readings,
+    residual_ratio,
+    tissue_beside,
+    validate,
+)
 from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.motion.newton import QuietStanding
@@ -426,7 +433,7 @@ def predicted(
     found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
     parts = [fits_of_roles(results, roles, *corrections) for roles in (FITTED_ROLES, KEPT_ROLES)]
     about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
-    notes, on_same, plates = list(one.notes), _on_fitted_plates(results), None
+    notes, on_same, plates, tissue = list(one.notes), _on_fitted_plates(results), None, None
     if on_same.intersection(fit.name for fit in parts[1]):
         beside, table = (one.posterior or one).identification, found.body.sip
         # the table of a person of the weighed mass: all ten parameters of a segment grow with it
@@ -434,10 +441,12 @@ def predicted(
         weighed_table = replace(found.body, sip=Sip(table.segments, share * table.phi, table.covariance))
         of_table, own = plate_readings(beside, parts[0], weighed_table, identified)
         plates, told = (of_table, own), own.told(parts[0], identified)
+        tissue = tissue_beside(beside, parts[0], identified, own)
         notes += [PLATES_READ.format(told)] * bool(told)
     judged = partial(validate, found.body, identified, about=about, mass=mass)
     fitted = tuple(judged(fit) for fit in parts[0])
-    kept = tuple(judged(fit, plates=plates if fit.name in on_same else None) for fit in parts[1])
+    on_these = partial(judged, plates=plates, tissue=tissue)
+    kept = tuple((on_these if fit.name in on_same else judged)(fit) for fit in parts[1])
     if not kept:
         notes.append(
             "No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role "

@@ -76,15 +76,21 @@ def share_of(part: float) -> str:
     return "less than 1 %" if 0 < part < 0.01 else f"{format_number(100 * part, 0)} %"
 
 
-def parted_gain(gain: dict[str, dict[str, Any]]) -> str:
-    """Return what the table gets wrong in a trial (``gain`` of a validation), mass and distribution apart."""
+def parted_gain(gain: dict[str, dict[str, Any] | None]) -> str:
+    """Return what the table gets wrong in a trial (``gain`` of a validation): mass, distribution, and what moves
+    otherwise than a body of rigid segments.
+    """
     # each with its 95 % interval: 3.6 % (1.2 to 5.9)
-    mass, spread = (
+    mass, spread, tissue = (
         f"{format_number(100 * share['value'])} %"
         + (f" ({' to '.join(format_number(100 * x) for x in share['ci95'])})" if share["ci95"] else "")
-        for share in (gain["mass"], gain["distribution"])
+        if share
+        else ""
+        for share in (gain["mass"], gain["distribution"], gain["tissue"])
     )
-    return f"of the table's difference {mass} is the wrong mass, and of the rest {spread} how it is distributed"
+    told = f"of the table's difference {mass} is the wrong mass, and of the rest {spread} how it is distributed"
+    moving = "skin, flesh and joints that move otherwise than the model, by what the fitted trials tell of them"
+    return f"{told}; of what is then left {tissue} {moving}" if tissue else told
 
 
 def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:

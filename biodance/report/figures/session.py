@@ -146,8 +146,12 @@ def wrench_figure(comparison: WrenchComparison, trial: str = "", *, filled: NDAr
 
 
 def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None = None) -> str:
-    """Return six channels, measured, by table and identified, over differences; shades as `wrench_figure`."""
+    """Return six channels, measured, by table and identified, with what skin, flesh and joints add where fitted trials
+    tell it, over differences; shades as `wrench_figure`.
+    """
     curves = [("with the table", one.table.value, svg.TABLE), ("identified", one.identified.value, svg.IDENTIFIED)]
+    if one.extended is not None:
+        curves.append(("identified, with skin and flesh", one.extended.value, svg.EXTENDED))
     about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
     cells = _channels(curves, one.measured.value, one.use)
     return svg.CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()

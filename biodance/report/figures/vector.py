@@ -40,6 +40,7 @@ class Stroke:
 
 
 MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(GREY, "6 3"), Stroke(GREEN, "2 2", 1.6)
+EXTENDED = Stroke(GREEN)
 """No side of the body: blue is right, red left alone."""
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
 SIDE_STROKES = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "middle": MIDDLE_SIDE}

@@ -21,7 +21,7 @@ VALIDATION_ROW = Schema(
     {
         "table": AGREEMENT_ROW.at("table_agreement"),
         "identified": AGREEMENT_ROW.at("identified_agreement"),
-        "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution")}),
+        "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution", "tissue")}),
     },
 )
 
