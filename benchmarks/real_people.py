@@ -1,10 +1,11 @@
 """Real people: what identification is worth on recordings of other laboratories, through the functions of the command.
 
-    BIODANCE_DATA=folder python -m benchmarks real_people FOLDER [--only paper masses halves]
+    BIODANCE_DATA=folder python -m benchmarks real_people FOLDER [--only paper masses halves trials]
 
 ``paper`` is the man of the laboratory of the paper, fitted on one movement, another kept; ``masses`` runners whose mass
-nobody declares; ``halves`` treadmills, one half of a trial fitted, the other kept. Nothing is chosen by hand but the
-roles of the trials, and where the man's long table is cut. Rows are kept in FOLDER, so that a stopped run goes on.
+nobody declares; ``halves`` treadmills, one half of a trial fitted, the other kept; ``trials`` visits of several, the
+first half of those of a kind fitted, the others kept. Nothing is chosen by hand but the roles of the trials, and where
+the man's long table is cut. Rows are kept in FOLDER, so that a stopped run goes on.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Markers, Role, Session, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
 
-QUESTIONS = ("paper", "masses", "halves")
+QUESTIONS = ("paper", "masses", "halves", "trials")
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 RUNNERS = tuple(f"rbds/S0{n}" for n in ("01", "03", "05", "09", "12", "16", "17", "18", "20", "24"))
 MAN = {"squats": (8.0, 27.5), "march": (27.5, 61.0)}
@@ -38,6 +39,17 @@ BELTS = {
     **{f"{runner} {speed}": f"runT{speed}" for runner in RUNNERS for speed in (25, 35)},
 }
 """Sessions, or single files, on treadmills; their trials."""
+CHILDREN = tuple(f"HC0{n}" for n in ("02D", "30A", "31A", "32A", "36A", "38A", "44A", "50A", "55A"))
+VISITS = {
+    "c3d_parser_Sydney": ("S4-AMGait",),
+    "c3d_parser_FMC": ("MH0222_BP",),
+    "subject4": ("walking", "squats", "STS", "DJ"),
+    **{
+        f"biomechzoo/HC{n}": (f"HC{n}",)
+        for n in ("002D", "030A", "031A", "032A", "036A", "038A", "044A", "050A", "055A")
+    },
+}
+"""Visits with several trials of a kind, and how the names of each kind begin."""
 
 
 def read(name: str, folder: Path) -> Session:
@@ -71,7 +83,19 @@ def halves(session: Session, trial: str) -> Session:
 
 def fitted_on(session: Session, fitted: str, hold: str) -> Session:
     """Return a session whose moving trial ``fitted`` is fitted and ``hold`` kept, no other."""
-    roles: dict[str, Role] = {fitted: "fit", hold: "validate"}
+    return with_roles(session, {fitted: "fit", hold: "validate"})
+
+
+def first_half(session: Session, kind: str) -> Session:
+    """Return a session of which the first half of the moving trials whose names begin with ``kind`` is fitted, the
+    others kept.
+    """
+    names = [one.name for one in session.trials if one.role != "static" and one.name.startswith(kind)]
+    return with_roles(session, {name: "fit" if 2 * k < len(names) - 1 else "validate" for k, name in enumerate(names)})
+
+
+def with_roles(session: Session, roles: dict[str, Role]) -> Session:
+    """Return a session whose moving trials have these roles, and no others any."""
     moved = (one if one.role == "static" else replace(one, role=roles.get(one.name, "skip")) for one in session.trials)
     return replace(session, trials=tuple(moved))
 
@@ -90,6 +114,9 @@ def sessions(question: str, folder: Path) -> dict[str, Callable[[], Session]]:
     for fitted, hold in (("first", "second"), ("second", "first")) * (question == "halves"):
         for name, trial in BELTS.items():
             add(f"{name}, {hold}", lambda n=name, t=trial: halves(read(n, folder), t), fitted, hold)
+    for name, kinds in VISITS.items():
+        for kind in kinds if question == "trials" else ():
+            made[f"{name} {kind}"] = lambda n=name, k=kind: first_half(read(n, folder), k)
     return made
 
 
@@ -110,12 +137,17 @@ def residuals(one: TrialValidation) -> Row:
     """Return RMS differences (6,) N, N·m in a kept trial, and for how many seconds they were measured."""
     weighed = Wrench(one.table.time, one.weighed * one.table.value)
     rms = {"table": one.table_agreement.rms, "identified": one.identified_agreement.rms}
+    if one.extended is not None:
+        rms["extended"] = compare(one.measured, one.extended, one.use).rms
     return {**rms, "weighed": compare(one.measured, weighed, one.use).rms, "seconds": one.use.sum() / one.measured.rate}
 
 
-def ratios(row: Row) -> Array:
-    """Return residuals (6,) in kept trials: of the identified body, over those of the table with the weighed mass."""
-    kept, names = row["kept"].values(), ("identified", "weighed")
+def ratios(row: Row, which: str = "identified") -> Array:
+    """Return residuals (6,) in kept trials: of the identified body, or that with skin, flesh and joints ("extended"),
+    over those of the table with the weighed mass.
+    """
+    kept = [one if which in one else {**one, which: one["identified"]} for one in row["kept"].values()]
+    names = (which, "weighed")
     own, table = (sum(one["seconds"] * np.square(one[name]) for one in kept) for name in names)
     return np.asarray(np.sqrt(own / table))
 
@@ -128,16 +160,16 @@ def told(name: str, row: Row) -> str:
     means = [" -> ".join(f"{one[part].mean():.1f}" for one in rms) for part in (slice(0, 3), slice(3, 6))]
     gain, wide = row["gain"] or {}, "{:.2f} ({:.2f} to {:.2f})"
     sure = [wide.format(gain[key], *gain[f"{key}_interval"]) for key in ("force", "moment") if gain]
-    by = " ".join(f"{value:.2f}" for value in ratios(row))
-    return f"| {name} | {' | '.join((*means, ', '.join(sure), by))} |"
+    by = (" ".join(f"{value:.2f}" for value in ratios(row, which)) for which in ("identified", "extended"))
+    return f"| {name} | {' | '.join((*means, ', '.join(sure), *by))} |"
 
 
-def median(rows: list[Row]) -> str:
+def median(rows: list[Row], which: str) -> str:
     """Return the medians of the ratios of some rows by channel, and in how many a channel is worse by over 2 %."""
-    found = np.array([ratios(row) for row in rows if row.get("kept")]).reshape(-1, 6)
+    found = np.array([ratios(row, which) for row in rows if row.get("kept")]).reshape(-1, 6)
     by = [f"{name} {value:.2f}" for name, value in zip(CHANNELS, np.median(found, axis=0), strict=True)]
     worse = [f"{name} {count}" for name, count in zip(CHANNELS, (found > 1.02).sum(axis=0), strict=True)]
-    return f"{len(found)} of {len(rows)}. Identified over table, median: {', '.join(by)}. Worse: {', '.join(worse)}."
+    return f"{len(found)} of {len(rows)}. {which} over table, median: {', '.join(by)}. Worse: {', '.join(worse)}."
 
 
 def weighed(runner: str, folder: Path) -> Row:
@@ -175,4 +207,5 @@ def main() -> None:
             path = asked.folder / question / (re.sub(r"[^\w.]+", "_", name) + ".json")
             rows.append(kept(path, lambda: judged(make())))  # noqa: B023
             print(told(name, rows[-1]), flush=True)
-        print(f"\n{median(rows)}")
+        for which in ("identified", "extended"):
+            print(f"\n{median(rows, which)}")
