@@ -90,6 +90,24 @@ def test_the_scales_say_what_is_loose() -> None:
     assert max(scales.values()) < 1.0
 
 
+def test_what_the_plates_read_is_no_tissue() -> None:
+    body, fit, _ = trials(4.0, 8)
+    read = np.tile([3.0, -2.0, 5.0, 1.0, 2.0, -1.0], (fit.motion.time.size, 1)) * np.cos(fit.motion.time)[:, None]
+    there = replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value + read))
+    beside = Tissue(body, (there,), (read,), ABOUT)
+    np.testing.assert_allclose(beside.readings.size, told(body, fit).readings.size, rtol=1e-6, atol=1e-9)
+    assert not np.allclose(told(body, there).readings.size, beside.readings.size, rtol=0.1, atol=1e-4)
+
+
+def test_nothing_is_told_by_what_a_low_pass_has_taken_out() -> None:
+    body, fit, _ = trials(4.0, 9)
+    # One coefficient, at 4.5 Hz, of the cosine transform of every fourth of 1500 frames at 100 Hz.
+    low, wave = replace(fit, cutoff=3.0), 20.0 * np.cos(np.pi * 135 * (2 * np.arange(1500) / 4 + 1) / (2 * 375))
+    loud = replace(low, wrench=Wrench(fit.wrench.time, fit.wrench.value + wave[:, None]))
+    quiet, disturbed = (told(body, one).readings.size for one in (low, loud))
+    np.testing.assert_allclose(disturbed, quiet, atol=1e-6 * np.abs(quiet).max())
+
+
 def test_without_a_run_of_usable_frames_nothing_is_told() -> None:
     body, fit, kept = trials(1.0, 5)
     tissue = told(body, replace(fit, use=np.zeros_like(fit.use)))

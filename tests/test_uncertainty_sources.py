@@ -161,6 +161,16 @@ def test_a_raised_arm_turns_without_a_jump() -> None:
     assert np.abs(np.diff(turns, axis=0)).max() < 0.02
 
 
+def test_a_ball_joint_is_turned_by_less_than_half_a_turn() -> None:
+    one = body()
+    q = np.tile(one.neutral, (50, 1))
+    axis = one.joint_index("right_shoulder_flexion")
+    # Cardan angles a whole turn on are the same posture; the quaternion of their half angles is the negative one.
+    q[:, 7 + axis] = 0.4 + 2 * np.pi + 0.1 * np.sin(np.arange(50) / 5)
+    turns = chart_of(one).turns(q.T)[axis]
+    np.testing.assert_allclose(turns, 2 * np.sin((q[:, 7 + axis] - 2 * np.pi) / 2), atol=1e-12)
+
+
 def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
     """Return a source, the index of one of its errors, and what that error displaces at unchanged coordinates, by
     construction.
