@@ -137,8 +137,8 @@ def residuals(one: TrialValidation) -> Row:
     """Return RMS differences (6,) N, N·m in a kept trial, and for how many seconds they were measured."""
     weighed = Wrench(one.table.time, one.weighed * one.table.value)
     rms = {"table": one.table_agreement.rms, "identified": one.identified_agreement.rms}
-    if one.extended is not None:
-        rms["extended"] = compare(one.measured, one.extended, one.use).rms
+    if one.extended_agreement is not None:
+        rms["extended"] = one.extended_agreement.rms
     return {**rms, "weighed": compare(one.measured, weighed, one.use).rms, "seconds": one.use.sum() / one.measured.rate}
 
 

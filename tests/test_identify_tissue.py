@@ -113,6 +113,10 @@ def test_without_a_run_of_usable_frames_nothing_is_told() -> None:
     tissue = told(body, replace(fit, use=np.zeros_like(fit.use)))
     assert not tissue.readings.size.any()
     np.testing.assert_array_equal(TissueInTrial(tissue, kept.motion).added, 0.0)
+    one = validate(body, body, kept, about=ABOUT, tissue=tissue)
+    assert one.extended is None
+    assert one.extended_agreement is None
+    assert one.gain.tissue is None
 
 
 def test_what_it_gains_on_kept_movement_stands_beside_what_the_body_gains() -> None:
@@ -122,6 +126,8 @@ def test_what_it_gains_on_kept_movement_stands_beside_what_the_body_gains() -> N
     assert plain.extended is None
     assert plain.gain.tissue is None
     assert one.gain.tissue is not None
+    assert one.extended_agreement is not None
+    assert np.all(one.extended_agreement.rms < one.identified_agreement.rms)
     assert one.gain.tissue.ci95 is not None
     assert one.gain.tissue.ci95[0] > 0.3
     assert one.gain.mass == plain.gain.mass

@@ -187,11 +187,16 @@ class TrialValidation:
 
     @cached_property
     def extended(self) -> Wrench | None:
-        """The identified wrench with what skin, flesh and joints add, about ``about``; None without ``tissue``."""
-        if self.tissue is None:
+        """The identified wrench with what skin, flesh and joints add, about ``about``; None where nothing tells it."""
+        if self.tissue is None or not self.tissue.tissue.readings.scales:
             return None
         added = wrench_about_point(self.tissue.added, self.about)
         return Wrench(self.identified.time, self.identified.value + added)
+
+    @cached_property
+    def extended_agreement(self) -> Agreement | None:
+        """How well `extended` agrees; None without it."""
+        return None if self.extended is None else compare(self.measured, self.extended, self.use)
 
     @cached_property
     def gain(self) -> ParameterGain:

@@ -228,9 +228,12 @@ def _compared(found: SessionIdentification) -> list[Row]:
 
 
 def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tuple[str, Agreement]]:
-    """Return how well the table, the identified parameters and, beside the paper's, those of the posterior agree."""
+    """Return how well the table, the identified parameters, these with skin and flesh, and, beside the paper's,
+    those of the posterior agree.
+    """
     if found.posterior is None:
-        return [("table", trial.table_agreement), ("identified", trial.identified_agreement)]
+        extended = [("with skin and flesh", trial.extended_agreement)] if trial.extended_agreement else []
+        return [("table", trial.table_agreement), ("identified", trial.identified_agreement), *extended]
     every = (*found.posterior.validations, *found.posterior.fitted)
     same = [("posterior", other.identified_agreement) for other in every if other.name == trial.name]
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]

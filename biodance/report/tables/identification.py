@@ -21,6 +21,7 @@ VALIDATION_ROW = Schema(
     {
         "table": AGREEMENT_ROW.at("table_agreement"),
         "identified": AGREEMENT_ROW.at("identified_agreement"),
+        "extended": AGREEMENT_ROW.at("extended_agreement"),
         "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution", "tissue")}),
     },
 )
