@@ -3,7 +3,7 @@
 Beside the identified body and what the plates read, trials leave y - W phi - plates = G z + noise. Columns of G are the
 elementary errors of `uncertainty.sources` in the wrench: a segment's markers that slide with the joints beside it or
 sag with their acceleration, matter that moves against its segment, hinges and joint centres that lie elsewhere. What is
-left of real people is mostly that: in eight recordings of six laboratories it repeats from stride to stride.
+left of real people repeats from stride to stride (docs/decisions/2026-11-29-plates-of-kept-movement.md).
 
 Each z is N(0, s²), of the size of the table times a scale of the session for each kind of error, whose logarithm is
 N(0, 0.6²); the noise is learned beside, band by band. Scales and noise are the most probable ones (expectation
