@@ -44,6 +44,7 @@ the session's own file leaves out.
 
 import csv
 import functools
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date as day
@@ -172,7 +173,7 @@ def traced_outline(path: str | Path) -> dict[str, FootSizes]:
         The file is missing, has other columns, no number where one belongs, or fewer than 12 points of a foot.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise SessionRefused(f"foot_outline: there is no file {path}. Check the path, relative to session.toml.")
     with path.open(encoding="utf-8-sig", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -434,7 +435,7 @@ def _beside(path: Path, found: _Contents) -> _Contents:
     subject = found.subject
     files = {"scan": subject.scan, "foot_outline": subject.foot_outline}
     placed = {name: str(path.parent / said) for name, said in files.items() if isinstance(said, str)}
-    if subject.scan is not None and not Path(placed["scan"]).is_file():
+    if subject.scan is not None and not os.path.isfile(placed["scan"]):
         raise SessionRefused(f"scan: there is no file {placed['scan']}. Check the path, relative to {path.name}.")
     return found.model_copy(update={"subject": subject.model_copy(update=placed)})
 
