@@ -59,6 +59,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused, did_you_mean
 from biodance.lab.markers.sets import parse_map
+from biodance.lab.plain_text import read_text
 from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.session.entries import (
     PlateEntry,
@@ -175,8 +176,10 @@ def traced_outline(path: str | Path) -> dict[str, FootSizes]:
     path = Path(path)
     if not os.path.isfile(path):
         raise SessionRefused(f"foot_outline: there is no file {path}. Check the path, relative to session.toml.")
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.DictReader(file))
+    try:
+        rows = list(csv.DictReader(read_text(path).splitlines()))
+    except csv.Error:  # a quotation mark that is never closed
+        rows = []
     if not rows or not {"side", "x_cm", "y_cm"} <= set(rows[0]):
         raise SessionRefused(f"foot_outline: {path} needs the columns side, x_cm and y_cm and a row for every point.")
     found = {}
