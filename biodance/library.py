@@ -61,7 +61,7 @@ def locate(path: str, name: str, suffix: str = ".toml") -> Path:
     first, _, rest = path.partition("/")
     found = folder(first) / rest / f"{name}{suffix}"
     if not found.is_file():
-        raise UnknownName.of(f"file in {path}", name, names(path, suffix))
+        raise UnknownName.of(f"name in {path}", name, names(path, suffix))
     return found
 
 
