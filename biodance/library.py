@@ -5,6 +5,7 @@ knows that.
 """
 
 import json
+import os
 import re
 import tomllib
 import zipfile
@@ -23,7 +24,7 @@ _DIGITS = 40
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 """A number with a decimal comma."""
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_DEEPEST}}}""")
-"""A key of so many parts that tomllib needs minutes for what `_refuse_deep` would refuse afterwards."""
+"""A key of so many parts that tomllib needs minutes for what `_refuse_extreme` would refuse afterwards."""
 
 
 def folder(name: str) -> Path:
@@ -60,7 +61,7 @@ def locate(path: str, name: str, suffix: str = ".toml") -> Path:
     first, _, rest = path.partition("/")
     found = folder(first) / rest / f"{name}{suffix}"
     if not found.is_file():
-        raise UnknownName.of(f"file in {path}", name, names(path, suffix))
+        raise UnknownName.of(f"name in {path}", name, names(path, suffix))
     return found
 
 
@@ -89,27 +90,36 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     Raises
     ------
     FileRefused
-        It is not TOML, or nested without end.
+        It is not TOML, nested without end, or holds a whole number that no computation can take.
     """
     try:
         if _DEEP_KEY.search(text):
             raise RecursionError
         found = tomllib.loads(text)
-        _refuse_deep(found)
+        _refuse_extreme(found)
         return found
     except RecursionError as error:
         raise FileRefused(f"{path}: tables or lists lie in each other too deeply. Write them flat.") from error
     except tomllib.TOMLDecodeError as error:
         advice = "Write decimals with a point: 60.3." if _COMMA.search(_line(text, error)) else "Correct that line."
         raise FileRefused(f"{path}: is not valid TOML: {error}. {advice}") from error
+    except ValueError as error:  # also Python's own, for digits by the thousand
+        raise FileRefused(
+            f"{path}: holds a whole number of more than {_DIGITS} digits, larger than anything that is counted. "
+            f"Correct it."
+        ) from error
 
 
-def _refuse_deep(found: Any) -> None:
-    """Raise RecursionError where tables and lists lie in each other more than `_DEEPEST` times."""
+def _refuse_extreme(found: Any) -> None:
+    """Raise RecursionError where tables and lists lie in each other more than `_DEEPEST` times, ValueError for a whole
+    number of more than `_DIGITS` digits.
+    """
     here = [found]
     for _ in range(_DEEPEST):
-        inner = (one.values() if isinstance(one, dict) else one for one in here)
-        here = [one for some in inner for one in some if isinstance(one, dict | list)]
+        inside = [one for some in here for one in (some.values() if isinstance(some, dict) else some)]
+        if any(isinstance(one, int) and abs(one) >= 10**_DIGITS for one in inside):
+            raise ValueError
+        here = [one for one in inside if isinstance(one, dict | list)]
         if not here:
             return
     raise RecursionError
@@ -160,8 +170,12 @@ def _line(text: str, error: tomllib.TOMLDecodeError) -> str:
 
 
 def refuse_special(path: Path) -> None:
-    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
-    if path.exists() and not path.is_file() and not path.is_dir():
+    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever, and for a name that no file
+    can have.
+    """
+    if "\0" in str(path):
+        raise FileRefused(f"{str(path)!r}: no file has such a name (it holds a NUL). Correct it.")
+    if os.path.exists(path) and not path.is_file() and not path.is_dir():  # Path.exists raises for a name too long
         raise FileRefused(
             f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy its content into a file."
         )

@@ -13,22 +13,28 @@ import numpy as np
 from lab_sessions import person, plate, table_of
 from robots import biped
 from small_dances import BODY, small_dance
+from trimesh.creation import box
 
 from biodance.body.body import body_text, read_body
+from biodance.body.solids import read_mesh
+from biodance.body.tables.anthropometry import read_segment_table
 from biodance.body.urdf import read_urdf
 from biodance.dance.dance import Dance
+from biodance.dance.problem.plan import read_plan
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.program_tables import read_mot, write_mot
 from biodance.lab.readers.amti_text import read as read_amti_ascii
 from biodance.lab.readers.bsf import read as read_bsf
 from biodance.lab.readers.c3d import read_c3d
 from biodance.lab.readers.trc import read_trc, write_trc
 from biodance.lab.robot import read_encoders
-from biodance.lab.session.file import read_session_file
+from biodance.lab.session.file import read_session_file, traced_outline
 from biodance.lab.session.results_folder import check_results, write_manifest
+from biodance.library import folder
 from biodance.pipeline.lab_file import read_lab
-from biodance.records import Trial
+from biodance.records import SIDES, Trial
 from biodance.report.laboratory import to_toml
 from biodance.uncertainty.tolerances import shipped
 
@@ -122,10 +128,26 @@ def _results(path: Path) -> None:
     write_manifest(path.parent, path.parent, {})
 
 
+def _feet(path: Path) -> None:
+    angle = np.linspace(0, 6.2, 20)
+    rows = [
+        f"{side},{x:.3f},{y:.3f}" for side in SIDES for x, y in zip(13 * np.cos(angle), 4 * np.sin(angle), strict=True)
+    ]
+    path.write_text("\n".join(["side,x_cm,y_cm", *rows]) + "\n")
+
+
+def _shown(found: object) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    return {"all": np.array(repr(found))}, ()
+
+
 def _verified(path: Path) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     found = check_results(path.parent)
     assert found is not None
     return {"bytes": np.array(path.read_bytes())}, found.changed
+
+
+def _shipped(*parts: str) -> Callable[[Path], None]:
+    return lambda path: path.write_bytes(folder(parts[0]).joinpath(*parts[1:]).read_bytes()) and None
 
 
 INPUTS = {
@@ -169,6 +191,23 @@ INPUTS = {
         lambda path: path.write_text(biped()) and None,
         lambda path: _body(read_urdf(path, feet=("r_sole", "l_sole"))),
     ),
+    "feet": Input("feet.csv", _feet, lambda path: _shown(traced_outline(path))),
+    "scan": Input(
+        "scan.obj",
+        lambda path: box(extents=(0.4, 0.3, 1.7)).export(path) and None,
+        lambda path: ({"corners": np.asarray(read_mesh(path).vertices)}, ()),
+    ),
+    "marker set": Input(
+        "set.toml",
+        _shipped("anthropometry", "marker_sets", "vicon_41.toml"),
+        lambda path: _shown(read_marker_set(path)),
+    ),
+    "segment table": Input(
+        "table.csv",
+        _shipped("anthropometry", "segments", "winter_2009.csv"),
+        lambda path: _shown(read_segment_table(path)),
+    ),
+    "protocol": Input("plan.toml", _shipped("protocols", "dances", "easy.toml"), lambda path: _shown(read_plan(path))),
 }
 """Every kind of input; bsf recordings come from real data (`bsf_input`)."""
 

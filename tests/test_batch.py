@@ -21,7 +21,7 @@ from batch_work import archive_of, client_of, worked
 
 import biodance
 from biodance.batch.run import LEDGER, Ledger, _submitted, run_batch
-from biodance.batch.summary import outliers, summary_table
+from biodance.batch.summary import SESSIONS, outliers, same_recordings, summary_table, write_summary
 from biodance.batch.work import (
     ROW_TYPES,
     Outcome,
@@ -33,6 +33,7 @@ from biodance.batch.work import (
 )
 from biodance.cli import run
 from biodance.errors import BiodanceError
+from biodance.lab.session.results_folder import write_manifest
 from biodance.pipeline.trial import attempt
 
 
@@ -278,6 +279,18 @@ def test_a_book_that_cannot_be_written_is_one_sentence_and_no_loss(tmp_path: Pat
         (out / LEDGER).unlink()
     found = run_batch(archive, out, workers=1, work=batch_work.count)
     assert (len(found.outcomes), "s0" in worked(archive)) == (2, False)
+
+
+def test_the_same_recordings_in_two_folders_are_said(tmp_path: Path) -> None:
+    for name, held in {"a": "1", "b": "1", "c": "2", "d": ""}.items():
+        place = tmp_path / SESSIONS / name
+        place.mkdir(parents=True)
+        place.joinpath("results.json").write_text(name)
+        write_manifest(place, tmp_path, {"walk.c3d": held, "session.toml": name} if held else {})
+    tmp_path.joinpath(SESSIONS, "d", "manifest.json").write_text("{")
+    assert same_recordings(tmp_path, "abcde") == [("a", "b")]
+    write_summary(tmp_path, "archive", [Outcome(name, "0", "done", "") for name in "abcd"])
+    assert "a, b hold the same recordings; each is counted here." in (tmp_path / "report.html").read_text()
 
 
 def test_settings_and_times_of_files_belong_to_the_fingerprint(tmp_path: Path) -> None:

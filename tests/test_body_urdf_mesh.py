@@ -92,6 +92,8 @@ def test_a_mesh_that_is_missing_or_damaged_is_named(tmp_path):
         FileRefused, match=r"r_pad shows no sole, since of its meshes the mesh 'sole\.stl' is not where"
     ):
         read_urdf(robot(tmp_path), feet=FEET)
+    with pytest.raises(FileRefused, match=r"since of its meshes the mesh 'x+\.stl' is not where"):
+        read_urdf(robot(tmp_path, "x" * 5000 + ".stl"), feet=FEET)
     (tmp_path / "sole.obj").write_text("not a mesh")
     with pytest.raises(FileRefused, match=r"r_pad shows no sole, since of its meshes .*sole\.obj"):
         read_urdf(robot(tmp_path, "sole.obj"), feet=FEET)

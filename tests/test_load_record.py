@@ -135,3 +135,19 @@ def test_the_place_that_a_finding_tells_is_where_its_load_pulls() -> None:
     point = case.poses.points([segment], place[None])[:, 0]
     moment = np.cross(point, wrench[:, :3])
     assert np.abs(wrench[:, 3:] - moment).max() < 0.02 * np.abs(moment).max()  # what is left turns a ball of 40 mm
+
+
+@pytest.mark.parametrize(
+    ("smallest", "told"),
+    [
+        ((1.0, 8.7), "1.0 kg (left foot) to 8.7 kg (trunk with head)."),
+        ((1.0, np.inf), "cases: 1.0 kg (left foot); none of any size on trunk with head."),
+        ((np.inf, np.inf), "in half of the cases: none of any size on left foot, trunk with head."),
+    ],
+)
+def test_no_size_is_infinite(smallest: tuple[float, float], told: str) -> None:
+    search = found(("left_foot", 0.6), ("trunk_head", 0.4))
+    suspects = tuple(replace(one, smallest=size) for one, size in zip(search.suspects, smallest, strict=True))
+    said = say_load(replace(search, suspects=suspects, p_no_load=0.9, reference="the table"))
+    assert said.startswith("No load is found")
+    assert said.endswith(told)

@@ -57,7 +57,7 @@ def _of_a_session(folder: Path) -> dict[str, Path]:
     """
     earlier = examine(read_session(hidden(folder / "S02", visit=1, trials=("static", "move_1"))))
     before = identification_of(earlier)
-    now = hidden(folder / "S01", "plate_gain:target=Fz,gain=0.06", trials=("static", "move_1", "squat_1"))
+    now = hidden(folder / "S01", "plate_gain:target=Fz,gain=0.06", trials=("static", "move_1", "squat_1", "squat_2"))
     result = examine(read_session(now), reference=before)
     found = biodance.diagnose(result, reference=before)
     for name in ("report", "diagnose"):
@@ -107,6 +107,7 @@ def _of_archives(folder: Path) -> dict[str, Path]:
 def test_the_pages_hold_what_is_to_be_asked(pages: dict[str, Path]) -> None:
     text = {name: page.read_text(encoding="utf-8") for name, page in pages.items()}
     assert set(text) == set(NAMES)
+    assert '<div class="curves"><div class="cells three">' in text["report"], "key values by trial"
     for part in ("replay", "changes", "movement", "predicts", "checks", "standing", "trials"):
         assert f'<section id="{part}">' in text["report"]
     assert "plate gain" in text["diagnose"]
@@ -116,8 +117,10 @@ def test_the_pages_hold_what_is_to_be_asked(pages: dict[str, Path]) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nobody_is_shut_out_of_a_page(browser: Page, pages: dict[str, Path], name: str) -> None:
+    before = len(browser.said())
     unfold(browser, pages[name].as_uri())
     assert complaints(browser) == []
+    assert [one for one in browser.said()[before:] if "GL" not in one] == []
 
 
 def test_without_webgl_the_replay_says_so_and_the_time_still_runs(pages: dict[str, Path]) -> None:

@@ -17,10 +17,12 @@ import pytest
 from biodance.body.body import body_text, read_body
 from biodance.cli.shared import say
 from biodance.dance.dance import Dance
-from biodance.errors import FileRefused, without_codes
+from biodance.errors import BiodanceError, FileRefused, without_codes
+from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.plain_text import for_spreadsheet
 from biodance.lab.plates.faults import read_corrections
 from biodance.lab.robot import read_encoders
+from biodance.lab.session.file import read_session_file
 from biodance.lab.session.results_folder import read_manifest
 from biodance.library import read_toml
 from biodance.pipeline.lab_file import read_lab
@@ -70,6 +72,26 @@ def test_a_number_that_no_computation_takes_is_one_sentence(tmp_path: Path, digi
     (tmp_path / "body.json").write_text(body_text(BODY, "").replace("1", digits, 1))
     with pytest.raises(FileRefused, match="larger than anything that is counted"):
         read_body(tmp_path / "body.json")
+
+
+@pytest.mark.parametrize("text", ["height_m = {}", "girths_cm = {{ thigh = [{}, 1] }}", "age = -{}"])
+@pytest.mark.parametrize("digits", ["9" * 41, "9" * 400, "9" * 5000])
+def test_a_whole_number_of_toml_that_no_computation_takes_is_one_sentence(
+    tmp_path: Path, text: str, digits: str
+) -> None:
+    (tmp_path / "session.toml").write_text("[subject]\n" + text.format(digits) + "\n")
+    with pytest.raises(FileRefused, match=r"session\.toml: holds a whole number of more than 40 digits"):
+        read_session_file(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "a\\u0000b"])
+@pytest.mark.parametrize(
+    "text", ['[subject]\nscan = "{}"', '[subject]\nfoot_outline = "{}.csv"', '[markers]\nfile = "{}.toml"']
+)
+def test_a_name_that_no_file_can_have_is_one_sentence(tmp_path: Path, text: str, name: str) -> None:
+    (tmp_path / "session.toml").write_text(text.format(name) + "\n")
+    with pytest.raises(BiodanceError, match=r"there is no (file|such)|no file has such a name"):
+        read_marker_set(read_session_file(tmp_path).marker_set)
 
 
 def test_a_quotation_mark_that_is_never_closed_is_one_sentence(tmp_path: Path) -> None:

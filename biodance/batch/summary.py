@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,9 @@ import numpy as np
 from biodance.batch.work import ROW_TYPES, Outcome
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
+from biodance.errors import FileRefused
 from biodance.lab.plain_text import whole_file
+from biodance.lab.session.results_folder import read_manifest
 from biodance.library import parse_json
 from biodance.report.files import csv_text, write_files
 
@@ -57,7 +60,8 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
     pages = {one.name: f"{SESSIONS}/{folder_name(one.name)}/{_PAGE}" for one in outcomes}
     links = {name: quote(page) for name, page in pages.items() if (folder / page).is_file()}
-    page = _page(name, outcomes, table, left_out, links, alike)
+    twice = same_recordings(folder, [one.name for one in outcomes])
+    page = _page(name, outcomes, table, left_out, links, alike, twice)
     write_files(folder, {"summary.csv": csv_text(table), _PAGE: page})
 
 
@@ -98,6 +102,19 @@ def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ..
     return tuple(found)
 
 
+def same_recordings(folder: Path, names: Iterable[str]) -> list[tuple[str, ...]]:
+    """Return which of the sessions ``names`` in an archive's ``folder`` hold the same recordings, by their SHA-256."""
+    found: dict[frozenset[str], list[str]] = {}
+    for name in names:
+        with suppress(FileRefused):  # damaged since: `biodance verify` says it
+            manifest = read_manifest(folder / SESSIONS / folder_name(name))
+            held = (
+                {file: sha for file, sha in manifest.inputs.items() if not file.endswith(".toml")} if manifest else {}
+            )
+            found.setdefault(frozenset(held.values()), []).append(name)
+    return [tuple(some) for held, some in found.items() if held and len(some) > 1]
+
+
 def _figure(table: "pd.DataFrame") -> "Figure | None":
     """Draw the key figures of all sessions as histograms; None where there is nothing to draw."""
     from biodance.report.figures.style import figure, look
@@ -124,6 +141,7 @@ def _page(
     left_out: Sequence[str],
     links: dict[str, str],
     alike: Sequence[str] = (),
+    twice: Sequence[tuple[str, ...]] = (),
 ) -> str:
     """Return the page of an archive as HTML text."""
     from markupsafe import Markup
@@ -150,6 +168,7 @@ def _page(
         verdict=first["verdict"].dropna().to_dict(),
         strange=outliers(table),
         alike=alike,
+        twice=twice,
         figure=svg_address(drawn) if drawn else "",
         left_out=left_out,
         trials=len(table),

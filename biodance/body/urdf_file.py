@@ -5,6 +5,7 @@ fixed) with their placements and limits. Transmissions, sensors and colours do n
 wiki.ros.org/urdf/XML.
 """
 
+import os
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -41,7 +42,7 @@ def mesh_file(urdf: Path, name: str) -> Path:
         above = urdf.resolve().parents
         places = [*(one / package / rest for one in above), *(one / rest for one in above if one.name == package)]
     for place in places:
-        if place.is_file():
+        if os.path.isfile(place):  # Path.is_file raises for a name too long
             return place
     raise FileRefused(
         f"the mesh {name!r} is not where {urdf} says. Put it beside the URDF, or below a folder "

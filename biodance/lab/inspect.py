@@ -286,8 +286,8 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
     for trial in {trial["name"]: trial for trial in found["trials"]}.values():
         yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'# role = "{trial["role"]}"  # {trial["why"]}')
     yield from ("", *_marker_lines(found))
-    for plate in found["plates"]:
-        yield f"# {plate['trial']}: {plate['name']}, TYPE {plate['type']}. {' '.join(plate['decisions'])}".rstrip()
+    if found["plates"]:
+        yield "# What was decided about zero, signs and place of every plate is told by: biodance inspect"
 
 
 def _begun_map(session: Session, found: dict[str, Any]) -> Iterator[str]:

@@ -195,7 +195,7 @@ def force_gains(plain: Body, done: tuple[TrialResult, ...]) -> tuple[ForceGain, 
 def _sentence(gain: JointGain) -> str:
     fitted, without, with_it = (f"{1000 * value:.0f} mm" for value in (gain.fitted, gain.without, gain.with_it))
     start = f"{len(gain.markers)} markers lie {fitted} from a body without {_WORDS[gain.name].removeprefix('a ')}"
-    held = f"left out one at a time, they are foretold to {without} without and to {with_it} with them"
+    held = f"left out one at a time, they are predicted to {without} without and to {with_it} with them"
     end = f"The body has {_WORDS[gain.name]}" if gain.taken else "No gain: the body goes without"
     return f"{start}; {held}. {end}."
 

@@ -266,19 +266,22 @@ def _segments(search: LoadSearch) -> str:
 
 
 def _none(search: LoadSearch) -> str:
-    sizes = sorted((one.smallest, one.segment) for one in search.suspects)
-    (low, easy), (high, hard) = sizes[0], sizes[-1]
+    sizes = sorted((one.smallest, spaced(one.segment)) for one in search.suspects)
+    seen = [f"{size:.1f} kg ({where})" for size, where in sizes if np.isfinite(size)]
+    hidden = [where for size, where in sizes if not np.isfinite(size)]
+    parts = [" to ".join(dict.fromkeys([seen[0], seen[-1]]))] if seen else []
+    parts += [f"none of any size on {listed(hidden)}"] if hidden else []
     return (
         f"No load is found beyond {search.reference} (probability of no load {search.p_no_load:.2f}). The smallest "
-        f"that this session would find in half of the cases: {low:.1f} kg ({spaced(easy)}) to {high:.1f} kg "
-        f"({spaced(hard)})."
+        f"that this session would find in half of the cases: {'; '.join(parts)}."
     )
 
 
 def _unclear(search: LoadSearch) -> str:
     advice = "" if search.reference != "the table" else f" {_ADVICE}"
+    least = search.best.smallest
+    finds = f"{least:.1f} kg there in half of the cases" if np.isfinite(least) else "none there, of any size"
     return (
         f"Whether the subject carries a load beyond {search.reference} cannot be told. If so, it would be "
-        f"{size_and_segments(search)}; this session finds {search.best.smallest:.1f} kg there in half of the "
-        f"cases.{advice}"
+        f"{size_and_segments(search)}; this session finds {finds}.{advice}"
     )

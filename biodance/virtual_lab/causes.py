@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from biodance.body.parts import GRAVITY
-from biodance.errors import BiodanceError, UnknownName, refuse_unknown
+from biodance.errors import BiodanceError, refuse_unknown
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Subject
 from biodance.virtual_lab.movement import Protocol
@@ -349,6 +349,7 @@ IN_THE_PERSON: dict[str, Callable[[Hidden, Scene], Scene]] = {
     "shoulder_girdle": _motion("girdle_motion"),
 }
 CAUSES = (*FAULTS, *FORCES, *IN_THE_PERSON)
+_KIND = "effect that the virtual laboratory can make"
 
 
 def conceal(cause: Hidden, scene: Scene) -> Scene:
@@ -366,8 +367,7 @@ def conceal(cause: Hidden, scene: Scene) -> Scene:
     if cause.name in FORCES:
         builder = FORCES[cause.name]
         return scene.pushed(builder(cause.target, **cause.numbers(_parameters(builder))))
-    if cause.name not in FAULTS:
-        raise UnknownName.of("effect that the virtual laboratory can make", cause.name, CAUSES)
+    refuse_unknown(_KIND, cause.name, CAUSES)
     ends = np.cumsum([trial.duration for trial in scene.protocol.trials])
     starts = ends - [trial.duration for trial in scene.protocol.trials]
     # Share of the session's time.
@@ -383,10 +383,13 @@ def parse_cause(text: str) -> Hidden:
 
     Raises
     ------
+    UnknownName
+        There is no such cause.
     BiodanceError
         The text does not have that form; the message shows the part and an example.
     """
     name, _, rest = text.partition(":")
+    refuse_unknown(_KIND, name, CAUSES)
     values: dict[str, tuple[float, ...]] = {}
     target = ""
     for part in filter(None, rest.split(",")):

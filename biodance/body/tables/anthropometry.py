@@ -8,6 +8,7 @@ import functools
 import hashlib
 import io
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -221,7 +222,7 @@ def read_segment_table(name_or_path: str | Path) -> SegmentTable:
     """
     path = FAMILY.locate(name_or_path)
     own = str(name_or_path).endswith(FAMILY.suffix)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FileRefused(
             f"{path}: there is no such table. Check the path; tables known by name are {', '.join(FAMILY.files())}."
         )

@@ -4,6 +4,7 @@ simply not there.
 """
 
 import json
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -315,7 +316,7 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     if str(name_or_path).startswith(GUESSED):
         return _guessed(str(name_or_path))
     path = FAMILY.locate(name_or_path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FileRefused(
             f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are "
             f"{', '.join(FAMILY.files())}."

@@ -44,6 +44,7 @@ the session's own file leaves out.
 
 import csv
 import functools
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date as day
@@ -58,6 +59,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused, did_you_mean
 from biodance.lab.markers.sets import parse_map
+from biodance.lab.plain_text import read_text
 from biodance.lab.plates import Told, ToldPlate
 from biodance.lab.session.entries import (
     PlateEntry,
@@ -172,10 +174,12 @@ def traced_outline(path: str | Path) -> dict[str, FootSizes]:
         The file is missing, has other columns, no number where one belongs, or fewer than 12 points of a foot.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise SessionRefused(f"foot_outline: there is no file {path}. Check the path, relative to session.toml.")
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.DictReader(file))
+    try:
+        rows = list(csv.DictReader(read_text(path).splitlines()))
+    except csv.Error:  # a quotation mark that is never closed
+        rows = []
     if not rows or not {"side", "x_cm", "y_cm"} <= set(rows[0]):
         raise SessionRefused(f"foot_outline: {path} needs the columns side, x_cm and y_cm and a row for every point.")
     found = {}
@@ -434,7 +438,7 @@ def _beside(path: Path, found: _Contents) -> _Contents:
     subject = found.subject
     files = {"scan": subject.scan, "foot_outline": subject.foot_outline}
     placed = {name: str(path.parent / said) for name, said in files.items() if isinstance(said, str)}
-    if subject.scan is not None and not Path(placed["scan"]).is_file():
+    if subject.scan is not None and not os.path.isfile(placed["scan"]):
         raise SessionRefused(f"scan: there is no file {placed['scan']}. Check the path, relative to {path.name}.")
     return found.model_copy(update={"subject": subject.model_copy(update=placed)})
 

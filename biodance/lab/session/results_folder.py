@@ -125,7 +125,7 @@ def check_results(folder: Path) -> _Verified | None:
         return None
     missing, changed = _not_as_written(folder, manifest)
     recordings = ((Path(manifest.session) / name, sha) for name, sha in sorted(manifest.inputs.items()))
-    other = (str(path) for path, sha in recordings if not path.is_file() or file_hash(path) != sha)
+    other = (str(path) for path, sha in recordings if not os.path.isfile(path) or file_hash(path) != sha)
     return _Verified(folder, manifest, missing, changed, tuple(other), _said_otherwise(folder, manifest))
 
 

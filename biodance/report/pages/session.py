@@ -33,7 +33,7 @@ from biodance.report.tables.schema import Row
 from biodance.report.tables.session import GAP_ROW
 from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres
 
-STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
+STATUS_WORDS = {"ok": "good", "warning": "with a note", "refused": "refused"}
 
 
 def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[TrialResult, list[Check | None]]]]:

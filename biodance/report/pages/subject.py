@@ -77,9 +77,7 @@ def _walk(found: Repetitions, words: Language) -> list[str]:
     return [
         words.say(ran if found.runs else walked, speed=words.number(speed, 1), pace=words.number(3.6 * speed, 1)),
         words.say("You made %(number)s steps in a minute.", number=words.number(values["cadence"].mean)),
-        words.say(
-            "We looked at %(right)s steps with the right foot and %(left)s with the left.", right=right, left=left
-        ),
+        words.say("Steps we looked at: %(right)s with the right foot, %(left)s with the left.", right=right, left=left),
     ]
 
 

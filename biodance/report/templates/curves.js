@@ -216,5 +216,7 @@
     }
   }
 
-  document.querySelectorAll(".curves").forEach(figure);
+  document.querySelectorAll(".curves").forEach((root, k) => {
+    if (root.querySelector(".legend")) figure(root, k); // else points by trial: nothing to zoom or to switch off
+  });
 })();
