@@ -15,8 +15,8 @@ from human_cases import human_case
 from lab_sessions import person
 
 from biodance.effects import Recorded
+from biodance.effects._base.body_sides import back_of_hand, middle
 from biodance.effects._base.rigid_groups import RigidGroup
-from biodance.effects._base.wrists import back_of_hand, middle
 from biodance.effects.labels_swapped import LabelsSwapped, exchanges, refuted, renamed
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import read_raw

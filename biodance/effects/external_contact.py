@@ -6,8 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Parameter
-from biodance.effects._base.transient import Transient
+from biodance.effects._base.effect import Parameter, Transient
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 from biodance.spatial import wrench_of_force

@@ -2,7 +2,7 @@
 
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
-from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.quality_check import Quantity
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
 from biodance.lab.plates.faults import POSITION
 

@@ -7,8 +7,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.quality_check import QualityCheck, Recorded
-from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.quality_check import QualityCheck, Quantity, Recorded
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass
 from biodance.records import Array, Trial, Wrench

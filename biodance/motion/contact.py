@@ -18,7 +18,6 @@ from scipy.signal import savgol_filter
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import distribute
-from biodance.motion.sitting import sitting
 from biodance.motion.soles import (
     Footing,
     Soles,
@@ -28,6 +27,7 @@ from biodance.motion.soles import (
     footing,
     inside,
     overhang_notes,
+    sitting,
     standing_on,
 )
 from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
