@@ -31,12 +31,6 @@ _LASTS = 1.0
 _NAMED, _TOLD = 4.0, 9.0
 """Differences of squared deviations: two in natural logarithm of the evidence for a name; three standard deviations
 from which two causes are told apart."""
-_LEAST = 0.005
-"""Gain that matters: makers' accuracy, 0.2 to 0.5 % of full scale."""
-_USUAL = 0.02
-"""Gain up to which laboratories have it without calling it a fault."""
-_ALIKE = 0.004
-"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 _LOADED = 0.02
 """Share of the need under which the place of a plate's pressure says nothing: its centre stands for it."""
 
@@ -115,9 +109,10 @@ class PlateGain(InstalledPlate):
             "1",
             0.02,
             "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)",
-            least=_LEAST,
-            usual=_USUAL,
-            alike=_ALIKE,
+            # Gain that matters: makers' accuracy, 0.2 to 0.5 % of full scale.
+            least=0.005,
+            usual=0.02,
+            alike=0.004,
         ),
     )
     separated_by = "Squats against standing: the channel's own size must change."
