@@ -325,11 +325,6 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
     return lasting & (np.abs(wrench[:, 2]) >= threshold)
 
 
-def left_out_said(number: int, why: TrialRefused | str) -> str:
-    """Return the sentence that a plate is not used."""
-    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
-
-
 def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
     """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and
     what was decided.

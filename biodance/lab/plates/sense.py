@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.plates import CONTENT, FOUR_SENSORS
-from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading, left_out_said
+from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading
 from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
@@ -262,6 +262,11 @@ def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array
     # An axial vector under a mirror: det R = -1 turns it once more.
     moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
     return wrench_about_origin(np.hstack([force, moment]), centre)
+
+
+def left_out_said(number: int, why: TrialRefused | str) -> str:
+    """Return the sentence that a plate is not used."""
+    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
 
 
 def sense_plates(
