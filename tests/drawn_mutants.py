@@ -115,18 +115,19 @@ def guards(file: str, holder: str) -> tuple[str, ...]:
     those that name it or the class or function that holds the line; where all three are so, first.
     """
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    outer, _, own = module.rpartition(".")
     room = file.split("/")[1].removesuffix(".py")
-    begin = tuple(f"test_{one}" for one in NAMED.get(room, (room,)))
+    begin = tuple(f"test_{one}" for one in (*NAMED.get(room, (room,)), own))
     holders = holder.split() or [""]
     if holders[0].startswith("_") or not holders[0]:  # what calls it stands in the same file
         tree = ast.parse((CHECKOUT / file).read_text(encoding="utf-8"))
         holders += [node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     holders = [name for name in holders if len(name) > 5 and not name.startswith("_")]  # not `check`, `name`
-    public = dict.fromkeys([*holders, module.rpartition(".")[2]])
+    public = dict.fromkeys([*holders, own])
     score = {}
     for path in sorted((CHECKOUT / "tests").glob("test_*.py")):
         text = path.read_text(encoding="utf-8")
-        imported = module in text
+        imported = module in text or re.search(rf"from {outer} import .*\b{own}\b", text) is not None
         called = sum(len(re.findall(rf"\b{name}\b", text)) for name in public)
         if imported or called or path.stem.startswith(begin):
             score[f"tests/{path.name}"] = (2 * imported + 2 * path.stem.startswith(begin) + bool(called), called)
@@ -158,7 +159,7 @@ def judged(copy: Path, mutant: Mutant) -> Outcome:
     seconds = time.perf_counter() - start
     if code == ALL_PASSED:
         return Outcome(mutant.name, "survived", "", seconds, fingerprint(mutant))
-    if failed is None or run_tests(copy, (failed[1],), "-x")[0] != ALL_PASSED:
+    if failed is None or run_tests(copy, (failed[1].split("[")[0],), "-x")[0] != ALL_PASSED:
         return Outcome(mutant.name, "broken run", output[-300:].replace("\n", " "), seconds, fingerprint(mutant))
     return Outcome(mutant.name, "killed", failed[1], seconds, fingerprint(mutant))
 
