@@ -345,6 +345,26 @@ def test_no_line_is_long() -> None:
     assert long == []
 
 
+GROWING = {
+    "biodance.app.sessions": {"SessionRun"},
+    "biodance.body.urdf": {"_Carrier"},
+    "biodance.dance.search.word_course": {"WordSearch", "_Place"},
+    "biodance.diagnosis.watch": {"MarkerWatch", "WrenchWatch"},
+}
+"""Dataclasses that are filled while somebody works, by module; every other one is a record that nobody changes."""
+
+
+def test_records_are_frozen() -> None:
+    found: dict[str, set[str]] = defaultdict(set)
+    for module, tree in modules().items():
+        for node in walked(tree):
+            if isinstance(node, ast.ClassDef):
+                made = [ast.unparse(one) for one in node.decorator_list if "dataclass" in ast.unparse(one)]
+                if any("frozen=True" not in one for one in made):
+                    found[module].add(node.name)
+    assert found == GROWING
+
+
 TINY = {
     "package.a": "from package.b import two\n\none = 1\n",
     "package.b": "two = 2\n\n\ndef f():\n    from package.room.c import one\n",
