@@ -342,7 +342,7 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
     return contact_with_plates(trial, soles, feet_on_ground(trial, soles, mass=mass))
 
 
-def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) -> _FeetOnGround:
+def feet_on_ground(trial: Trial, soles: Soles, *, mass: float) -> _FeetOnGround:
     """Return what touches the ground in a prepared trial.
 
     ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at

@@ -237,7 +237,7 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
 
 
 def plate_parameters(
-    raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float = 1.0, turn: Array | None = None
+    raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float, turn: Array | None = None
 ) -> PlateParameters:
     """Return the parameters of plate ``number`` (from 1), those that are ``told`` instead of the file's.
 
