@@ -132,7 +132,7 @@ def side_by_side(
     return np.concatenate([grid[:, 0], grid[:, 1]])
 
 
-def intervals(rows: Sequence[Interval], *, axes: "Axes | None" = None) -> "Axes":
+def intervals(rows: Sequence[Interval], *, axes: "Axes | None") -> "Axes":
     """Draw value and interval of every row, before (square) and after (circle: filled = known, pale = partly, open =
     not known).
     """

@@ -35,7 +35,7 @@ SAFETY_SECONDS = 10.0
 """s, start of Python included, within which a mutant of the safety of dances must be killed."""
 PATIENCE = 600.0
 """s after which the tests of a mutant are given up."""
-NOT_COPIED = (".git", ".venv", "build", "demo", "__pycache__", ".*_cache", "*.egg-info")
+NOT_COPIED = (".git", ".venv", "node_modules", "build", "demo", "__pycache__", ".*_cache", "*.egg-info")
 FAILED, ERRORS, ALL_PASSED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE), (2, 3, 4, 5), 0
 
 

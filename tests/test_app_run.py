@@ -52,6 +52,12 @@ def test_what_is_said_of_the_subject_in_the_folder_above_makes_results_old(archi
     assert archive["s1"].task().fingerprint != before
 
 
+def test_a_window_asks_for_the_pages_that_it_shows(archive):
+    task = archive["s1"].task()
+    assert task.pages
+    assert task.tables
+
+
 def test_a_refused_session_says_why(archive):
     worker = Worker(archive)
     worker.start([archive["s0"]])

@@ -55,6 +55,8 @@ ONE_ALGORITHM = {
     "virtual_lab/movement/performance.py": "a plan performed, by pinocchio's dynamics, or copied from a screen",
     "virtual_lab/person/__init__.py": "the true body, its habits and loads, its prosthesis; in 12 segments",
     "virtual_lab/visit.py": "a laboratory, and a day in it",
+    "effects/_base/effect.py": "the contract of a cause that is fitted, in a channel, or coming and going",
+    "effects/_base/exchanged_labels.py": "which markers carry each other's names, and from which frame to which",
     "lab/plates/__init__.py": "what a file and session.toml say of a plate, entry by entry",
     "lab/plates/decode.py": "a plate: its outline, and from channels to wrench: origin, gaps, units, zero, wrench",
     "lab/plates/read.py": "all plates of a recording: decoded, without what is no measurement, placed as told",
@@ -341,6 +343,26 @@ def test_no_line_is_long() -> None:
         if len(line) > LINE
     ]
     assert long == []
+
+
+GROWING = {
+    "biodance.app.sessions": {"SessionRun"},
+    "biodance.body.urdf": {"_Carrier"},
+    "biodance.dance.search.word_course": {"WordSearch", "_Place"},
+    "biodance.diagnosis.watch": {"MarkerWatch", "WrenchWatch"},
+}
+"""Dataclasses that are filled while somebody works, by module; every other one is a record that nobody changes."""
+
+
+def test_records_are_frozen() -> None:
+    found: dict[str, set[str]] = defaultdict(set)
+    for module, tree in modules().items():
+        for node in walked(tree):
+            if isinstance(node, ast.ClassDef):
+                made = [ast.unparse(one) for one in node.decorator_list if "dataclass" in ast.unparse(one)]
+                if any("frozen=True" not in one for one in made):
+                    found[module].add(node.name)
+    assert found == GROWING
 
 
 TINY = {

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from two_plates import session
 
 from benchmarks.plates import Step, draw
 from biodance.cli import run
 from biodance.diagnosis.archive.conditions import pool
+from biodance.diagnosis.archive.evidence import plate_evidence
 from biodance.diagnosis.archive.judge import judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, plate_places
@@ -58,6 +60,16 @@ def test_one_strange_visit_is_no_change_of_the_plate():
     found = judge_archive(odd)
     assert not changes(found)
     assert {one.visit for one in found.strangers if one.quantity == "offset_z"} == {"V09"}
+
+
+def test_whoever_stands_for_long_shows_a_zero_better():
+    """The mean force is m (v1 - v0) / T: 62 kg that sway at 0.02 m/s, both at the beginning and the end of T."""
+    static = session()["static"]
+    found = [one for one in plate_evidence([static], PlateVisit("V01", "S01")) if one.quantity == "offset_x"]
+    seconds = float(np.ptp(static.plates[0].wrench.time))
+    assert [len(one.plates) for one in found] == [2]
+    assert found[0].sd == pytest.approx(np.hypot(0.3, 2**0.5 * 62.0 * 0.02 / seconds), rel=0.01)
+    assert abs(found[0].value) < found[0].sd
 
 
 def test_pooled_mean_of_values_computed_by_hand():

@@ -43,5 +43,16 @@ def test_one_file_is_enough(example: str) -> None:
     assert CheckKind.FORCES in found.explains
 
 
+def test_what_is_one_file_each_is_there() -> None:
+    table = PAGE.read_text(encoding="utf-8").partition("## One file each")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (.*) \| (.*) \| `(.*)::(.*)` \|$", table, flags=re.MULTILINE)
+    assert len(rows) == 6
+    for _, where, file, test in rows:
+        assert f"def {test}(" in (PAGE.parent / file).read_text(encoding="utf-8")
+        (path,) = re.findall(r"`(\w+/[\w/]+\.\w+)`", where)
+        assert (PAGE.parent / path).parent.is_dir()
+        assert (PAGE.parent / path).is_file() or path.rpartition("/")[2].startswith("NAME.")
+
+
 def test_without_its_file_it_is_gone() -> None:
     assert "shaking_floor" not in family.effects()

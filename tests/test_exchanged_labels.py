@@ -15,8 +15,9 @@ from human_cases import human_case
 from lab_sessions import person
 
 from biodance.effects import Recorded
+from biodance.effects._base.body_sides import back_of_hand, crossed_sides, middle, rightwards
+from biodance.effects._base.exchanged_labels import set_of
 from biodance.effects._base.rigid_groups import RigidGroup
-from biodance.effects._base.wrists import back_of_hand, middle
 from biodance.effects.labels_swapped import LabelsSwapped, exchanges, refuted, renamed
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import read_raw
@@ -124,6 +125,18 @@ def test_a_hand_that_is_bent_to_the_palm_is_no_mirror_image() -> None:
     static, dance = bent(static, 30.0), bent(dance, -70.0)
     assert middle(back_of_hand(dance.markers, "L")) < -0.8
     assert found_in(static, dance) == {}
+
+
+def test_a_head_that_looks_back_has_its_names() -> None:
+    """Left of it lies on the right of the body, but under other names the band would not be as in the static trial."""
+    static, walk = visit(speed=1.5)
+    columns = [walk.markers.names.index(name) for pair in HEAD for name in pair]
+    xyz = walk.markers.xyz.copy()
+    middle_of_head = xyz[:, columns].mean(axis=1, keepdims=True)
+    xyz[:, columns] = middle_of_head + (xyz[:, columns] - middle_of_head) * [-1.0, -1.0, 1.0]
+    back = replace(walk, markers=Markers(walk.markers.names, walk.markers.time, xyz))
+    assert set(crossed_sides(back.markers, rightwards(back.markers, set_of(back)))) == set(HEAD)
+    assert found_in(static, back) == {}
 
 
 def test_a_trial_that_is_mended_has_nothing_exchanged() -> None:

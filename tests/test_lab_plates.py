@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plate_emulator import RATE, Emulated, channels, random_pose, raw_file, step, yaw
 
-from biodance.lab.plates import declared_plates
+from biodance.lab.plates import PLATE_TYPES, declared_plates, plate_type
 from biodance.lab.plates.read import decode_plates, read_plates
 from biodance.lab.plates.sense import pressure_point
 from biodance.records import Markers
@@ -48,6 +48,18 @@ def test_the_wrench_that_went_in_comes_out(kind, reaction, z_up):
         assert plates[0].wrench.rate == pytest.approx(RATE)
         np.testing.assert_allclose(plates[0].corners, plate.corners, atol=1e-9)
         assert ("kept" if reaction else "turned round") in plates[0].decisions[-1]
+
+
+def test_a_new_type_is_one_entry(monkeypatch):
+    """Four sensors again, but each vertical force first: nothing else of biodance knows how many TYPEs there are."""
+    order, rng = (4, 5, 6, 7, 0, 1, 2, 3), np.random.default_rng(5)
+    plate = made(3, rng)
+    truth, _ = step(rng, plate)
+    recorded = channels(plate, truth)[:, order]
+    raw = raw_file([plate], [recorded], TYPE=np.array([9]))
+    assert read_plates(raw, metres=0.001).plates == ()
+    monkeypatch.setitem(PLATE_TYPES, 9, plate_type(*(PLATE_TYPES[3].outputs[k] for k in order)))
+    assert largest_error(read_plates(raw, metres=0.001).plates, truth) < 1e-6
 
 
 def test_the_centre_of_pressure_lies_where_the_person_stood():

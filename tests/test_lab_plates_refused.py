@@ -189,6 +189,15 @@ def test_no_plates_no_analog_no_rate():
     assert read_plates(raw, metres=0.001)[:2] == ((), ())
 
 
+@pytest.mark.parametrize(("askew", "said"), [(0.004, False), (0.006, True)])
+def test_a_belt_is_as_crooked_as_its_short_side_is_askew(askew, said):
+    """Of 0.4 by 1.8 m: the ends of the short sides are moved along the long ones, against each other."""
+    corners = np.array([[0.2, 0.9, 0.0], [-0.2, 0.9, 0.0], [-0.2, -0.9, 0.0], [0.2, -0.9, 0.0]])
+    corners[[0, 3], 1] += askew
+    _, decided = corners_in_lab(corners, metres=1.0, turn=np.eye(3))
+    assert any("deviate from a rectangle" in one for one in decided) is said
+
+
 def test_slightly_crooked_corners_are_used_and_said():
     corners = Emulated().corners
     corners[0] += [0.004, 0.003, 0]

@@ -3,9 +3,11 @@
 Nothing of biodance is broken here; `python tests/mutants.py` does that.
 """
 
+import ast
 import hashlib
 from pathlib import Path
 
+import drawn_mutants
 import mutants
 import pytest
 
@@ -82,3 +84,14 @@ def test_a_result_holds_as_long_as_entry_file_and_tests_are_the_same(
         digests.append(mutants.fingerprint(mutant))
     assert len(set(digests)) == 3
     assert mutants.fingerprint(mutant) == digests[-1]
+
+
+def test_drawn_mutants_follow_the_seed_and_break_one_place_that_tests_guard() -> None:
+    some = drawn_mutants.drawn(12, 7, ("batch", "registration"))
+    assert some == drawn_mutants.drawn(12, 7, ("batch", "registration"))
+    assert some != drawn_mutants.drawn(12, 8, ("batch", "registration"))
+    assert [Path(one.file).parts[1] for one in some].count("batch") == 6
+    for one in some:
+        text = (CHECKOUT / one.file).read_text(encoding="utf-8")
+        ast.parse(mutants.broken_text(one, text))
+        assert f"tests/test_{Path(one.file).parts[1]}.py" in one.tests

@@ -96,6 +96,13 @@ def test_who_hardly_moves_shows_no_instant():
     assert found.mass == pytest.approx(62.0, abs=0.05)
 
 
+def test_a_delay_is_read_between_the_lags_that_are_tried():
+    here = told(session()["squat_1"]).lag
+    for seconds in (0.001, 0.003, 0.013):  # by the top of the parabola through three correlations
+        there = told(changed(session(), late(seconds))["squat_1"]).lag
+        assert there - here == pytest.approx(seconds, abs=2e-4)
+
+
 def test_the_witness_sees_a_delay_and_a_weight():
     seen = recording(changed(session(), late(0.03))["squat_1"], mass=62.0)
     lag, mass = (one for one in observe(seen) if one.observer == "newton")

@@ -155,6 +155,19 @@ def test_the_forces_of_another_movement_are_refused(visit, place, capsys):
     assert not out.exists()
 
 
+def test_the_command_tells_a_person_where_the_session_lies(registered, monkeypatch, capsys):
+    found, place = registered
+    monkeypatch.setattr("biodance.pipeline.front.register", lambda *_, **__: found)
+    command = ["register", "markers.c3d", "forces.mot", "--out", str(place)]
+    assert run(command) == 0
+    told = capsys.readouterr()
+    assert place.name in told.out + told.err
+    assert run([*command, "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out) == json.loads(json.dumps(found.document()))
+    assert told.err == ""
+
+
 def test_a_file_without_plates_is_refused(visit, place):
     write_c3d(place / "bare.c3d", markers=biodance.read_trial(visit / "static.c3d").markers)
     with pytest.raises(TrialRefused, match="no force plate"):

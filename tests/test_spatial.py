@@ -82,3 +82,21 @@ def test_a_compact_mass_has_pinocchios_parameters(radius: float) -> None:
     place = np.array([0.1, -0.2, 0.3])
     inertia = pin.Inertia(2.5, place, 2.5 * radius**2 * np.eye(3))
     np.testing.assert_allclose(spatial.point_mass(2.5, place, radius=radius), inertia.toDynamicParameters(), atol=1e-15)
+
+
+def test_a_rigid_fit_is_scipys_and_never_a_mirror() -> None:
+    points, weight = RNG.normal(size=(5, 7, 3)), RNG.uniform(0.1, 1.0, size=(5, 7))
+    turns, places = Rotation.random(5, random_state=3), RNG.normal(size=(5, 3))
+    moved = np.stack([turn.apply(some) for turn, some in zip(turns, points, strict=True)]) + places[:, None]
+    moved += RNG.normal(0, 0.05, moved.shape)
+    for counted in (None, weight):
+        turn, place = spatial.rigid_fit(points, moved, counted)
+        for k, (some, there) in enumerate(zip(points, moved, strict=True)):
+            share = None if counted is None else counted[k]
+            middle, middles = np.average(some, axis=0, weights=share), np.average(there, axis=0, weights=share)
+            wanted, _ = Rotation.align_vectors(there - middles, some - middle, weights=share)
+            np.testing.assert_allclose(turn[k], wanted.as_matrix(), atol=1e-9)
+            np.testing.assert_allclose(place[k], middles - wanted.apply(middle), atol=1e-9)
+    # Points of one plane have two nearest turns, one of them a mirror.
+    turn, _ = spatial.rigid_fit(points * [1.0, 1.0, 0.0], points * [1.0, 1.0, 0.0] @ np.diag([1.0, -1.0, 1.0]))
+    np.testing.assert_allclose(np.linalg.det(turn), 1.0, atol=1e-12)

@@ -14,6 +14,7 @@ from made_cycles import walked_knees
 
 from biodance.cli import run
 from biodance.cli.shared import DONE, NEEDS_A_PERSON
+from biodance.identification.knowledge import known_together
 from biodance.pipeline.movement import account_for
 from biodance.pipeline.trial import OPEN, Check
 from biodance.report.pages.language import read_language
@@ -112,6 +113,16 @@ def test_every_part_has_a_range_or_an_honest_word(result):
     assert all(f"<dd>{said}</dd>" in html for said in ("Gait Lab", "Ana Ruiz", "November 22, 2026"))
     assert grade(html) <= 7
     assert not [word for word in JARGON if word in re.sub(r"base64,\S+|<style>.*?</style>", "", html, flags=re.S)]
+
+
+def test_a_pelvis_that_is_not_known_alone_is_told_with_its_neighbour(result):
+    pair = known_together(result.identification.identification.sip)[0]
+    told = account_for(result)
+    assert told.parts[0].segments == ("pelvis",)
+    assert not told.parts[0].measured
+    assert told.together.segments == pair.segments
+    assert told.together.low == pytest.approx(pair.mass - 1.96 * pair.sd, abs=1e-3)
+    assert told.together.high == pytest.approx(pair.mass + 1.96 * pair.sd, abs=1e-3)
 
 
 @pytest.mark.parametrize("what", ["marker distance, RMS", "mass on the plates against declared", "a new check"])

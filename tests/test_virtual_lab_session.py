@@ -16,7 +16,7 @@ from biodance.lab.readers.c3d import read_c3d
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.instruments import TISSUES
+from biodance.virtual_lab.instruments import CALIBRATION, TISSUES, TruePlate, digitise
 from biodance.virtual_lab.movement import Protocol, read_protocol
 from biodance.virtual_lab.person import AddedLoad, make_person, of_parameters, place_inertia
 from biodance.virtual_lab.person.skeleton import REALISTIC, small_rotation
@@ -302,3 +302,13 @@ def test_a_drawn_laboratory_records_what_can_be_read(tmp_path) -> None:
 def test_an_impossible_laboratory_is_refused(wrong) -> None:
     with pytest.raises(BiodanceError, match="legal are"):
         Laboratory(**wrong)
+
+
+def test_a_converter_rounds_to_its_steps_and_ends_at_ten_volts():
+    corners = np.array([[0.2, 0.3, 0.0], [-0.2, 0.3, 0.0], [-0.2, -0.3, 0.0], [0.2, -0.3, 0.0]])
+    plate = TruePlate(corners, np.eye(3), np.zeros(3), np.eye(6), np.zeros(6))
+    volts = np.array([[12.0] * 6, [-12.0] * 6, [3.001] * 6, [0.0] * 6])
+    for bits in (8, 16):
+        kept = digitise(volts @ CALIBRATION.T, plate, kind=4, bits=bits).channels
+        np.testing.assert_allclose(kept[[0, 1, 3]], [[10.0] * 6, [-10.0] * 6, [0.0] * 6], atol=1e-12)
+        np.testing.assert_allclose(kept[2], 3.001, atol=10.0 / 2**bits + 1e-12)

@@ -14,12 +14,17 @@ from types import MappingProxyType
 
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import UNLIKE, Care, ChannelEffect, Effect, Parameter
+from biodance.effects._base.effect import UNLIKE, Care, ChannelEffect, Effect, NamedCause, Parameter, Transient
 from biodance.effects._base.installed_plate import InstalledPlate
-from biodance.effects._base.named_cause import NamedCause
-from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
-from biodance.effects._base.quantity import Quantity
-from biodance.effects._base.transient import Transient
+from biodance.effects._base.quality_check import (
+    Checked,
+    DiscreteEffect,
+    QualityCheck,
+    Quantity,
+    Recorded,
+    unit_at,
+    unit_of,
+)
 from biodance.effects._base.words import About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import UnknownName
 from biodance.spatial import wrench_about_origin, wrench_about_point

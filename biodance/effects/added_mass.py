@@ -10,8 +10,6 @@ from biodance.spatial import point_mass
 
 _BESIDE = 0.2
 """m that a load may hang beside the segment that carries it."""
-_LEAST = 0.1
-"""kg that matter: half of what a clinic scale and clothes leave."""
 
 
 class AddedMass(Effect):
@@ -22,7 +20,14 @@ class AddedMass(Effect):
     name = "added_mass"
     prior = 0.02
     parameters = (
-        Parameter("mass", "kg", 1.0, "0.5-8 kg loads; 2.4 kg on the arm in Bonnet 2016", least=_LEAST),
+        Parameter(
+            "mass",
+            "kg",
+            1.0,
+            "0.5-8 kg loads; 2.4 kg on the arm in Bonnet 2016",
+            # kg that matter: half of what a clinic scale and clothes leave.
+            least=0.1,
+        ),
         *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),
     )
     separated_by = "Move the loaded segment alone, the rest standing still; repeat the session without the load."

@@ -13,8 +13,6 @@ WRONG = 0.3
 """Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all. A guess
 has it as its standard deviation.
 """
-_LEAST = 0.3
-"""kg that matter: clinic scale and clothes, 0.2 kg."""
 _USUAL = 0.01
 """Share of the mass up to which laboratories have it without calling it a fault: clothes and shoes, 0.7 kg of 70, which
 are smaller on a child.
@@ -36,7 +34,16 @@ class BodyMass(Effect):
 
     name = "body_mass"
     prior = 0.25
-    parameters = (Parameter("error", "kg", _USUAL * _ADULT, "1 % of body mass for clothes and shoes", least=_LEAST),)
+    parameters = (
+        Parameter(
+            "error",
+            "kg",
+            _USUAL * _ADULT,
+            "1 % of body mass for clothes and shoes",
+            # kg that matter: clinic scale and clothes, 0.2 kg.
+            least=0.3,
+        ),
+    )
     separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
     advice = "Enter the mass of the day, with clothes and shoes."
     about = About(

@@ -11,8 +11,6 @@ from biodance.spatial import wrench_of_force
 
 ROPE, _SHORTEST = 2.0, 0.5
 """m from the harness to the hook when the person stands upright: a ceiling of about 3 m; and at least."""
-_LEAST = 2.0
-"""N that matter: as a zero of a plate, 0.3 % of an adult's weight."""
 
 
 class BodyWeightSupport(Effect):
@@ -29,7 +27,8 @@ class BodyWeightSupport(Effect):
             "N",
             100.0,
             "15-30 % of body weight in overground support (SciELO S1413-35552014000600572)",
-            least=_LEAST,
+            # N that matter: as a zero of a plate, 0.3 % of an adult's weight.
+            least=2.0,
         ),
         Parameter("stiffness", "N/m", 150.0, "constant-force systems near 0, bungees some hundred newtons per metre"),
         Parameter("high", "m", 0.1, "from the hips' belt to the shoulders' straps of a harness"),

@@ -10,8 +10,6 @@ from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.effects.time_delay import TimeDelay, moved_in_time
 from biodance.records import Array
 
-_LEAST = 0.003
-"""s that matter: a third of a frame at 100 Hz."""
 _MINUTE = 60.0
 """s of a session where none is at hand."""
 _RATE = 0.01 / _MINUTE
@@ -36,7 +34,8 @@ class ClockDrift(Effect):
             "s",
             _RATE * _MINUTE,
             "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs",
-            least=_LEAST,
+            # s that matter: a third of a frame at 100 Hz.
+            least=0.003,
         ),
     )
     grows = TimeDelay

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.effects._base.left_out import checks_of_defects
-from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, checks_of_defects
 from biodance.effects._base.words import About, CauseWords
 from biodance.records import LeftOut, Trial
 

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Parameter
-from biodance.effects._base.transient import Transient
+from biodance.effects._base.effect import Parameter, Transient
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
@@ -16,8 +15,6 @@ _STEP, _FINE = 0.4, 0.15
 """s between the values of its course, to look for it and to size it: a hand comes and goes within about a second, and
 takes hold within half of one.
 """
-_LEAST = 2.0
-"""N that matter: as a zero of a plate, 0.3 % of an adult's weight."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,14 @@ class ExternalContact(Transient):
     name = "external_contact"
     prior = 0.02
     parameters = tuple(
-        Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)", least=_LEAST)
+        Parameter(
+            f"force_{axis}",
+            "N",
+            10.0,
+            "light touch of 1 N to tens of newtons (IJmker 2015)",
+            # N that matter: as a zero of a plate, 0.3 % of an adult's weight.
+            least=2.0,
+        )
         for axis in "xyz"
     )
     separated_by = "The video: what is touched, and when."

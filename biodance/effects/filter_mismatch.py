@@ -12,8 +12,6 @@ REFERENCE = 10.0
 """Hz: the cut-off that a lower one is compared with."""
 STRENGTH = 4.0 / REFERENCE**5
 """1/Hz⁵: growth of 1/cutoff⁴ per Hz by which the cut-off lies under the reference."""
-_LEAST = 0.5
-"""Hz that matter, below the filter that is assumed."""
 
 
 class FilterMismatch(Effect):
@@ -28,7 +26,8 @@ class FilterMismatch(Effect):
             "Hz",
             4.0,
             "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)",
-            least=_LEAST,
+            # Hz that matter, below the filter that is assumed.
+            least=0.5,
         ),
     )
     screened_at = (76.0,)  # 3 Hz: at 4 Hz, cameras of 0.3 mm look like a filter of the forces (log evidence 200 to 300)

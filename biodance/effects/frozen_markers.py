@@ -1,7 +1,6 @@
 """A marker stands still to the last bit while the others move: a gap that a program filled with the last value."""
 
-from biodance.effects._base.marker_faults import marker_checks
-from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, marker_checks
 from biodance.effects._base.words import About, CauseWords
 from biodance.lab.markers.signals import MarkerFault
 

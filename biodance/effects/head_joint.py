@@ -12,8 +12,6 @@ from biodance.effects._base.words import About, CauseWords, CheckKind
 
 _AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
 _MARKERS = 3
-_LEAST = 0.05
-"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class HeadJoint(MissingJoint):
@@ -26,7 +24,8 @@ class HeadJoint(MissingJoint):
             "rad",
             0.10,
             "5-15 deg rms of head movement in whole-body tasks (laboratory experience)",
-            least=_LEAST,
+            # rad that matter: as much as everybody moves it anyway (`natural`).
+            least=0.05,
         ),
         Parameter(
             "beyond",

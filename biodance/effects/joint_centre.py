@@ -15,9 +15,6 @@ from biodance.motion.ik.joint_unknowns import MISMARKED, MISSED
 from biodance.motion.track import track
 from biodance.records import Array
 
-_LEAST = 0.005
-"""m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce 1999, doi:10.1007/BF02513272)."""
-
 _NAME = "joint_centre"
 _ALIKE = {
     "hip": (("segment_length", "thigh"), (_NAME, "knee")),
@@ -44,7 +41,9 @@ class JointCentre(Effect):
             "m",
             MISSED,
             "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)",
-            least=_LEAST,
+            # m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce
+            # 1999, doi:10.1007/BF02513272).
+            least=0.005,
         )
         for axis in "xyz"
     )

@@ -7,17 +7,21 @@ from biodance.effects._base.effect import Effect, Parameter, axis_vector
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.records import Array
 
-_LEAST = 0.005
-"""rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
-doi:10.1016/j.gaitpost.2008.10.060)."""
-
 
 class LabTilt(Effect):
     """An ``angle`` (rad) about lab axis ``target`` ("x" or "y") by which gravity is turned in the lab frame."""
 
     name = "lab_tilt"
     parameters = (
-        Parameter("angle", "rad", 0.005, "0.1-1 deg after an L-frame calibration on an uneven floor", least=_LEAST),
+        Parameter(
+            "angle",
+            "rad",
+            0.005,
+            "0.1-1 deg after an L-frame calibration on an uneven floor",
+            # rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins
+            # 2009, doi:10.1016/j.gaitpost.2008.10.060).
+            least=0.005,
+        ),
     )
     separated_by = "Squats: the centre of mass changes its height, an offset does not."
     advice = "Hang a plumb line with two markers; set the cameras' vertical by it."

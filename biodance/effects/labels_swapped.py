@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.effects._base.exchange_spans import Pair, Spans, renamed_markers
-from biodance.effects._base.exchanged_labels import arms_hang, exchanged_labels, set_of
+from biodance.effects._base.exchanged_labels import Pair, Spans, arms_hang, exchanged_labels, renamed_markers, set_of
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind, SessionEntry
 from biodance.errors import BiodanceError

@@ -15,10 +15,6 @@ from biodance.motion.kinematics import neighbours, poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers
 
-_LEAST = 0.01
-"""m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce 1999, doi:10.1007/BF02513272);
-one marker among forty is twice as far off in every careful laboratory."""
-
 
 class MarkerMisplaced(Effect):
     """A ``shift`` (x, y, z: m, axes of its segment) from where the model has the marker ``target`` to where it sits."""
@@ -31,7 +27,10 @@ class MarkerMisplaced(Effect):
             "m",
             0.010,
             "up to 20-30 mm between examiners (Osis 2016, PLoS ONE 0147111)",
-            least=_LEAST,
+            # m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce
+            # 1999, doi:10.1007/BF02513272); one marker among forty is twice as far off in every
+            # careful laboratory.
+            least=0.01,
             usual=error_size("soft_tissue", "marker"),
         )
         for axis in "xyz"

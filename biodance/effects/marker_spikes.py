@@ -1,7 +1,6 @@
 """A marker jumps away and back within three frames: a reflection, or another marker, was taken for it."""
 
-from biodance.effects._base.marker_faults import marker_checks
-from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, marker_checks
 from biodance.effects._base.words import About, CauseWords
 from biodance.lab.markers.signals import MarkerFault
 

@@ -1,7 +1,6 @@
 """The recording program or a filter repeated the first or last sample of all channels where it had none."""
 
-from biodance.effects._base.left_out import checks_of_defects
-from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, checks_of_defects
 from biodance.effects._base.words import About, CauseWords
 
 

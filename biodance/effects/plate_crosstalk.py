@@ -9,8 +9,6 @@ _LEAST = {"1": 0.002, "m": 0.001, "1/m": 0.01}
 """1, m, 1/m that matter: makers' accuracy, 0.05 to 0.2 % of full scale."""
 _USUAL = {"m": 0.006}
 """As a plate beside its place, which looks like it."""
-_ALIKE = 0.005
-"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
 class PlateCrosstalk(InstalledPlate):
@@ -29,7 +27,7 @@ class PlateCrosstalk(InstalledPlate):
             "maker's limit of 2 % for classic strain-gauge plates",
             least=_LEAST,
             usual=_USUAL,
-            alike=_ALIKE,
+            alike=0.005,
         ),
     )
     separated_by = "Squats, which change Fz, at several places of the plate."

@@ -7,8 +7,7 @@ import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
-from biodance.effects._base.quality_check import QualityCheck, Recorded
-from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.quality_check import QualityCheck, Quantity, Recorded
 from biodance.effects._base.words import ACCEPT, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.records import CHANNELS, Array, Plate, Session, Trial, Wrench, runs
 from biodance.spatial import wrench_about_origin, wrench_about_point

@@ -2,17 +2,9 @@
 
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
-from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.quality_check import Quantity
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
 from biodance.lab.plates.faults import POSITION
-
-_LEAST = 0.003
-"""m that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
-doi:10.1016/j.gaitpost.2008.10.060)."""
-_USUAL = 0.006
-"""m up to which laboratories have it without calling it a fault: plates 2 to 5 mm off (Collins 2009)."""
-_ALIKE = 0.005
-"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
 class PlatePosition(InstalledPlate):
@@ -30,9 +22,13 @@ class PlatePosition(InstalledPlate):
             "m",
             0.010,
             "centre-of-pressure errors up to 30 mm (PMID 11091955); 1-2 mm wand errors",
-            least=_LEAST,
-            usual=_USUAL,
-            alike=_ALIKE,
+            # m that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins
+            # 2009, doi:10.1016/j.gaitpost.2008.10.060).
+            least=0.003,
+            # m up to which laboratories have it without calling it a fault: plates 2 to 5 mm off
+            # (Collins 2009).
+            usual=0.006,
+            alike=0.005,
         ),
     )
     separated_by = "Standing at several places, squats and a pole pressed onto marked points."

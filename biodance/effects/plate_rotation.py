@@ -9,14 +9,6 @@ from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, Che
 from biodance.lab.plates.faults import ROTATION
 from biodance.records import Array
 
-_LEAST = 0.005
-"""rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
-doi:10.1016/j.gaitpost.2008.10.060)."""
-_USUAL = 0.03
-"""rad up to which laboratories have it without calling it a fault."""
-_ALIKE = 0.01
-"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
-
 
 class PlateRotation(InstalledPlate):
     """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target
@@ -33,9 +25,11 @@ class PlateRotation(InstalledPlate):
             "rad",
             0.02,
             "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed",
-            least=_LEAST,
-            usual=_USUAL,
-            alike=_ALIKE,
+            # rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins
+            # 2009, doi:10.1016/j.gaitpost.2008.10.060).
+            least=0.005,
+            usual=0.03,
+            alike=0.01,
         ),
     )
     separated_by = "Lunges and arm swings in two directions; a pole pressed at a slant."

@@ -14,9 +14,6 @@ from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.motion.track import track
 from biodance.records import Array
 
-_LEAST = 0.005
-"""m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce 1999, doi:10.1007/BF02513272)."""
-
 
 class SegmentLength(Effect):
     """An ``error`` (m): segment ``target`` is this much longer, from its near to its far joint, than in the model."""
@@ -28,7 +25,9 @@ class SegmentLength(Effect):
             "m",
             0.010,
             "3-20 mm between typed measures and markers (public recordings: 16 mm at the hip)",
-            least=_LEAST,
+            # m that matter: who places markers twice places them 4 to 6 mm apart (Della Croce
+            # 1999, doi:10.1007/BF02513272).
+            least=0.005,
         ),
     )
     taken_up_by_calibration = True

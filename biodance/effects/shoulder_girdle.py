@@ -14,8 +14,6 @@ SHOULDERS = ("RSHO", "LSHO")
 """Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show
 where the joint is.
 """
-_LEAST = 0.06
-"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class ShoulderGirdle(MissingJoint):
@@ -26,7 +24,12 @@ class ShoulderGirdle(MissingJoint):
     name = "shoulder_girdle"
     parameters = (
         Parameter(
-            "angle", "rad", 0.10, "2-5 cm of the shoulder joint on the thorax (laboratory experience)", least=_LEAST
+            "angle",
+            "rad",
+            0.10,
+            "2-5 cm of the shoulder joint on the thorax (laboratory experience)",
+            # rad that matter: as much as everybody moves it anyway (`natural`).
+            least=0.06,
         ),
         Parameter(
             "beyond",

@@ -13,7 +13,6 @@ _FREQUENCY = 1.5
 """Hz: open vessels of 10 to 30 cm slosh at 1 to 2.5 Hz (w² = pi g / length, deep water)."""
 _RANGE = (0.7, 3.0)
 """Hz: from a bath to a cup."""
-_DAMPING = 0.08
 _CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
 _LEAST = 0.1
 """kg that matter: as an added mass."""
@@ -86,7 +85,7 @@ class SloshingLoad(Effect):
         local = carried_at(case, index) + high * np.eye(3)[1]
         rigid = case.needed_by(point_mass(1.0, local), index)
         place, acceleration = point_motion(case, index, local)
-        x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
+        x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=0.08)
         # Only what moves in the horizontal plane sloshes.
         level = np.array([1.0, 1.0, 0.0])
         return rigid, oscillator_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)

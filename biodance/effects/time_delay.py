@@ -7,8 +7,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.quality_check import QualityCheck, Recorded
-from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.quality_check import QualityCheck, Quantity, Recorded
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass
 from biodance.records import Array, Trial, Wrench
@@ -30,12 +29,6 @@ def moved_in_time(time: Array, value: Array, delay: Array) -> Array:
     return np.asarray(spline(np.clip(time - delay, time[0], time[-1])))
 
 
-_LEAST = 0.003
-"""s that matter: a third of a frame at 100 Hz."""
-_ALIKE = 0.002
-"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
-
-
 class TimeDelay(Effect):
     """A ``delay`` (s) of all forces against the markers; forces late = positive."""
 
@@ -47,8 +40,9 @@ class TimeDelay(Effect):
             "s",
             0.005,
             "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)",
-            least=_LEAST,
-            alike=_ALIKE,
+            # s that matter: a third of a frame at 100 Hz.
+            least=0.003,
+            alike=0.002,
         ),
     )
     screened_at = (-4.0, 4.0, 12.0)  # -20, 20, 60 ms: seen from none, the evidence of 20 ms is 169 instead of 16,000

@@ -23,8 +23,6 @@ _MARKERS = 4
 
 ELSEWHERE = ("HD", "SHO", "UPA", "ELB", "FRM", "WRA", "WRB", "FIN")
 """Markers that follow the neck, the shoulder blades and the arms as well as the thorax."""
-_LEAST = 0.05
-"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class TrunkJoint(MissingJoint):
@@ -35,7 +33,12 @@ class TrunkJoint(MissingJoint):
     name = "trunk_joint"
     parameters = (
         Parameter(
-            "angle", "rad", 0.06, "5-10 deg rms between lumbar and thoracic spine (laboratory experience)", least=_LEAST
+            "angle",
+            "rad",
+            0.06,
+            "5-10 deg rms between lumbar and thoracic spine (laboratory experience)",
+            # rad that matter: as much as everybody moves it anyway (`natural`).
+            least=0.05,
         ),
         Parameter(
             "beyond",

@@ -12,11 +12,6 @@ from biodance.lab.markers.sets import other_side
 from biodance.records import Array, Subject
 from biodance.uncertainty.caution import shift_slope
 
-_LEAST = 0.5
-"""kg that matter: a tenth of a leg below the knee."""
-_USUAL = 0.5
-"""kg up to which people have it without calling it a fault: two legs below the knee are known to be alike to 9 % (table
-of segments, 0.14 with a correlation of 0.8), 0.4 kg."""
 _ENDS = ("shank", "foot")
 """Segments where the lighter part of a leg may begin: thighs of intact people differ by more, and so do arms."""
 _FARTHEST = 0.35
@@ -37,8 +32,12 @@ class UnequalLimbs(Effect):
             "kg",
             1.0,
             "a transtibial prosthesis weighs a third to a half less than the limb that it replaces (Selles 1999)",
-            least=_LEAST,
-            usual=_USUAL,
+            # kg that matter: a tenth of a leg below the knee.
+            least=0.5,
+            # kg up to which people have it without calling it a fault: two legs below the knee
+            # are known to be alike to 9 % (table of segments, 0.14 with a correlation of 0.8),
+            # 0.4 kg.
+            usual=0.5,
         ),
         Parameter("beside", "1", 0.2, "one limb has changed, whatever both weigh beside the table (14 %)"),
         Parameter("place", "m", 0.08, "a fifth of a shank: stump, tube and foot are no calf"),

@@ -8,6 +8,7 @@ from biodance.effects._base.words import About, CauseWords
 from biodance.motion.contact import ground_contact, share_lacking
 from biodance.motion.soles import soles_from_body
 from biodance.records import Array, LeftOut, Mask
+from biodance.settings import STANDARD_GRAVITY
 
 _HELD = ("pelvis", "left_forearm_hand", "right_forearm_hand")
 """Segments by which people are carried beside their feet: they sit, or hold on."""
@@ -64,7 +65,7 @@ class UnmeasuredContact(DiscreteEffect):
 def _said(segment: str, sizes: dict[str, float]) -> str:
     heaviest = max(sizes, key=lambda name: sizes[name])
     return (
-        f"Something that no plate measures carries up to {sizes[heaviest] / 9.80665:.0f} kg at the "
+        f"Something that no plate measures carries up to {sizes[heaviest] / STANDARD_GRAVITY:.0f} kg at the "
         f"{segment.replace('_', ' ')}, in {', '.join(sizes)} (most in {heaviest})."
     )
 

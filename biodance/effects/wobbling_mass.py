@@ -14,9 +14,6 @@ LIMBS = 10.0
 """Hz: lowest resonances of the soft tissue of thigh and shank, 10 to 50 Hz (Wakeling & Nigg 2001, DOI
 10.1152/jappl.2001.90.2.412).
 """
-_DAMPING = 0.3
-_LEAST = 0.5
-"""kg that matter, by judgement."""
 
 
 class WobblingMass(Effect):
@@ -31,7 +28,8 @@ class WobblingMass(Effect):
             "kg",
             4.0,
             "a third to a half of trunk and thigh swings (Masters & Challis 2022, running)",
-            least=_LEAST,
+            # kg that matter, by judgement.
+            least=0.5,
         ),
     )
     separated_by = "Hops, heel drops and sudden stops: only content above 5 Hz shows it."
@@ -63,7 +61,7 @@ class WobblingMass(Effect):
         # The mass hangs at the segment's centre of mass, h / m.
         place, acceleration = point_motion(case, index, table[1:4] / table[0])
         moved = relative_motion(
-            acceleration, case.motion.rate, frequency=_FREQUENCY.get(self.target, LIMBS), damping=_DAMPING
+            acceleration, case.motion.rate, frequency=_FREQUENCY.get(self.target, LIMBS), damping=0.3
         )
         return oscillator_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
 

@@ -18,7 +18,6 @@ from scipy.signal import savgol_filter
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import distribute
-from biodance.motion.sitting import sitting
 from biodance.motion.soles import (
     Footing,
     Soles,
@@ -28,6 +27,7 @@ from biodance.motion.soles import (
     footing,
     inside,
     overhang_notes,
+    sitting,
     standing_on,
 )
 from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
@@ -342,7 +342,7 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
     return contact_with_plates(trial, soles, feet_on_ground(trial, soles, mass=mass))
 
 
-def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) -> _FeetOnGround:
+def feet_on_ground(trial: Trial, soles: Soles, *, mass: float) -> _FeetOnGround:
     """Return what touches the ground in a prepared trial.
 
     ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at

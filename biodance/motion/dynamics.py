@@ -79,9 +79,7 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
     return _JointTorques(motion.time, total[:, root:], residual)
 
 
-def distribute(
-    total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], *, threshold: float = COP_FORCE
-) -> tuple[Wrench, Wrench]:
+def distribute(total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_]) -> tuple[Wrench, Wrench]:
     """Return the wrenches of the right and the left foot, whose sum is ``total``.
 
     ``right``, ``left`` (T, 3) m: centres of the soles, their z the height of the ground there; ``touching`` (T, 2) True
@@ -93,8 +91,8 @@ def distribute(
     The paper prints d_right over the sum for the right foot; that would load the foot FARTHER from the zero-moment
     point, so the two are exchanged here. The paper scales the whole wrench, which puts both feet's centres of pressure
     on the total's, often between the feet; here each foot's force acts at its own centre, both moved by the same small
-    vector, so that forces and moments still add up exactly. With less than ``threshold`` N of vertical force there is
-    no zero-moment point: two halves.
+    vector, so that forces and moments still add up exactly. With less than 20 N of vertical force (`COP_FORCE`)
+    there is no zero-moment point: two halves.
 
     Raises
     ------
@@ -108,9 +106,9 @@ def distribute(
     )
     if np.shape(touching) != (frames, 2):
         raise BiodanceError(f"distribute: touching has shape {np.shape(touching)}, expected {(frames, 2)}.")
-    share = _right_share(total, right, left, np.asarray(touching, dtype=bool), threshold)
+    share = _right_share(total, right, left, np.asarray(touching, dtype=bool))
     centre = share[:, None] * right + (1 - share[:, None]) * left
-    point = zero_moment_point(total.value, height=centre[:, 2], threshold=threshold)
+    point = zero_moment_point(total.value, height=centre[:, 2], threshold=COP_FORCE)
     # About the zero-moment point only the vertical moment is left: the twist.
     twist = wrench_about_point(total.value, point)[:, 3:] * np.array([0.0, 0.0, 1.0])
     loaded = np.isfinite(point)
@@ -124,9 +122,9 @@ def distribute(
     return feet[0], feet[1]
 
 
-def _right_share(total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], threshold: float) -> Array:
+def _right_share(total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_]) -> Array:
     """Return the right foot's share (T,) of the total, between 0 and 1."""
-    point = zero_moment_point(total.value, height=(right[:, 2] + left[:, 2]) / 2, threshold=threshold)
+    point = zero_moment_point(total.value, height=(right[:, 2] + left[:, 2]) / 2, threshold=COP_FORCE)
     d_right, d_left = (np.linalg.norm((point - centre)[:, :2], axis=1) for centre in (right, left))
     # Near its own centre a foot has nearly all: its share is the other foot's distance.
     shared = np.divide(d_left, d_right + d_left, out=np.full(total.time.size, 0.5), where=d_right + d_left > 0)

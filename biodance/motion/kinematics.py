@@ -10,6 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.parts import NO_SEGMENT
+from biodance.motion.ik.compiled.ball_step import EQUAL_ANGLES
 from biodance.motion.ik.compiled.tree import PlacedJoints, fill_places, fill_tangent, move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import continuous_quaternion, cross, quaternion_matrix, skew, unit_quaternion
@@ -214,7 +215,6 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
 
 
 _SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
-_ROUNDED = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
 _NO_LIMIT = np.array([[-np.inf]])
 
 
@@ -249,7 +249,7 @@ def _ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, uppe
     both = [_turned_near(sign * angles, middle) for angles in (one, other)]
     more = [np.maximum(np.maximum(lower - angles, angles - upper), 0.0).sum(axis=0) for angles in both]
     away = [np.abs(angles - near).sum(axis=0) for angles in both]
-    better = (more[1] < more[0] - _ROUNDED) | ((more[1] < more[0] + _ROUNDED) & (away[1] < away[0]))
+    better = (more[1] < more[0] - EQUAL_ANGLES) | ((more[1] < more[0] + EQUAL_ANGLES) & (away[1] < away[0]))
     return np.where(better, both[1], both[0])
 
 

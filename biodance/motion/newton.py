@@ -110,7 +110,7 @@ class LagAndMass:
     swing: float
 
 
-def newton_of(trial: Trial, *, mass: float = float("nan")) -> LagAndMass | None:
+def newton_of(trial: Trial, *, mass: float) -> LagAndMass | None:
     """Return what Newton tells of a trial as read, or prepared; None where it holds no trunk, no plates, or plates of
     different clocks. ``mass`` kg of the person, NaN = unknown: without it a chair that carries is not seen.
     """
@@ -120,7 +120,7 @@ def newton_of(trial: Trial, *, mass: float = float("nan")) -> LagAndMass | None:
     return trunk.beside(trial.wrench, gravity=trial.settings.gravity, sway=trial.settings.standing.sway)
 
 
-def trunk_of(trial: Trial, *, mass: float = float("nan")) -> Trunk | None:
+def trunk_of(trial: Trial, *, mass: float) -> Trunk | None:
     """Return the trunk of a trial as read, or prepared; None without a marker set, pelvis, feet or plates."""
     known = _TRUNKS.get(trial)
     if known is None or not np.array_equal(known[0], mass, equal_nan=True):

@@ -18,7 +18,7 @@ from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.gain import Gain
 from biodance.effects import QualityCheck
-from biodance.effects._base.exchange_spans import Pair, Spans
+from biodance.effects._base.exchanged_labels import Pair, Spans
 from biodance.identification.identification import Identification
 from biodance.inference.decision import Inferred
 from biodance.lab.plates.faults import PlateCorrection

@@ -45,9 +45,7 @@ class SoftTissue:
     wave: Array
 
 
-def draw_soft_tissue(
-    person: Person, session: int, tolerances: skeleton.LabTolerances, tissue: str = "pulled"
-) -> SoftTissue:
+def draw_soft_tissue(person: Person, session: int, tolerances: skeleton.LabTolerances, tissue: str) -> SoftTissue:
     """Draw the coefficients of a kind of ``tissue`` (`TISSUES`): most belong to the person, a share of their variance
     to the day (clothes, tape, place on the skin).
     """
@@ -207,8 +205,8 @@ def lay_plate(
     tolerances: skeleton.LabTolerances,
     rng: np.random.Generator,
     *,
-    moment_zero: float = 0.0,
-    half: Array = HALF_SIZE,
+    moment_zero: float,
+    half: Array,
 ) -> TruePlate:
     """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a
     little elsewhere; ``moment_zero`` N·m, standard deviation of its moments' zeros beyond that of its forces; ``half``

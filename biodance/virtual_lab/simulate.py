@@ -88,7 +88,7 @@ def write_visit(
     *,
     seed: int,
     loads: tuple[AddedLoad, ...] = (),
-    visit: LabVisit = FIRST_VISIT,
+    visit: LabVisit,
     bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its

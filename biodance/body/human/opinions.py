@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.scan import ScannedBody, cut_scan, read_scan
+from biodance.body.human.scan import TO_NECK, ScannedBody, cut_scan, read_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
 from biodance.body.parts import TENSOR, RigidInertia
 from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table, row_numbers
@@ -80,7 +80,6 @@ def stack_volume(level: Array, girth: Array, aspect: Array, *, length: float) ->
 
 _CONTRADICTION = 0.15  # Share of the body mass by which girths, or a scan, may miss it
 _TRUNK = ("pelvis", "trunk_head")
-_HEAD = 0.16  # Of the stature: from the middle of the neck to the vertex
 _STEP = 0.01  # Of a girth: the step of a difference quotient
 
 
@@ -163,7 +162,7 @@ def _part_length(part: str, reference: Reference, sizes: Mapping[str, float]) ->
     trunk = {"lower_trunk": cut, "upper_trunk": 1 - cut}
     if part in trunk:
         return trunk[part] * sizes["trunk_head"]
-    return _HEAD * sizes["stature"] if part == "head" else sizes["forearm_hand" if part == "forearm" else part]
+    return TO_NECK * sizes["stature"] if part == "head" else sizes["forearm_hand" if part == "forearm" else part]
 
 
 def _part_solid(

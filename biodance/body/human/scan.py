@@ -206,7 +206,7 @@ def _turned(path: str, corners: Array, stature: float) -> _Scan:
 
 
 _UP = np.array([0.0, 1.0, 0.0])
-_NECK = 0.16
+TO_NECK = 0.16
 """Of the stature: from the vertex down to the middle of the neck, where the density changes."""
 _APART = np.radians(8.0)  # Least angle between a straight arm and the vertical
 _TILTS, _STEEPEST = 8, np.radians(35.0)
@@ -379,7 +379,7 @@ def _trunk(
     cut = _joint(high, middle + skeleton.lengths["pelvis"] * _UP, _UP)
     pelvis, trunk = (clip_surface(high, cut.place, sign * _UP) for sign in (-1, 1))
     cuts["trunk"] = _slope(cut, "lower_trunk")
-    neck = np.array([0.0, scan.height - _NECK * skeleton.stature, 0.0])
+    neck = np.array([0.0, scan.height - TO_NECK * skeleton.stature, 0.0])
     joint = middle + np.linalg.norm(skeleton.origins["trunk"]) * _UP
     parts = [
         _lump(clip_surface(trunk, neck, sign * _UP), name, joint, _UP)

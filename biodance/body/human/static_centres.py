@@ -77,9 +77,7 @@ def static_sd(joint: str) -> float:
     return error_size("hinge_centre", "hinge", state="before") if hinge else joint_size("joint_centre", joint)
 
 
-def static_centres(
-    mark: _Places, sizes: measures.Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True
-) -> Centres:
+def static_centres(mark: _Places, sizes: measures.Measures, *, hip: Hip, trunk_fraction: float, flat: bool) -> Centres:
     """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
 
     Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait.

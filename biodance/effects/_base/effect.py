@@ -8,13 +8,13 @@ The author of an effect writes its parameters and ONE of two methods; the other 
   difference at zero.
 
 What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a
-size by themselves). Causes that are found by a check instead of a fit (units, labels, clipping ...) are
-``DiscreteEffect``.
+size by themselves). One that comes and goes within a trial is a `Transient`. Causes that are found by a check instead
+of a fit (units, labels, clipping ...) are ``DiscreteEffect``.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import ClassVar
 
@@ -270,3 +270,38 @@ class ChannelEffect(Effect, ABC):
 def axis_vector(target: str) -> Array:
     """Return the unit vector (3,) of the axis that a target ends with."""
     return np.eye(3)["xyz".index(target[-1])]
+
+
+class Transient(Effect, ABC):
+    """A cause that may also have a course of its own in each trial."""
+
+    @abstractmethod
+    def local(self, case: Case) -> Array | None:
+        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds; None where it does not come
+        and go. The k parameters follow one another in time, as many for each of `parameters`.
+        """
+
+    @abstractmethod
+    def beside(self, place: Array) -> "Transient":
+        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment."""
+
+    @abstractmethod
+    def at_full_rate(self) -> "Transient":
+        """Return the cause with the finest allowed time course (`local`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedCause:
+    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
+    acts, and per trial the ``course`` of its parameters, as in `Transient.local`.
+    """
+
+    effect: Effect
+    theta: Array
+    covariance: Array
+    course: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target

@@ -162,7 +162,7 @@ class PostureSensitivity:
             np.matmul(-self.inverse[some], self.marker_slopes(some), out=out[some])
         return out
 
-    def marker_slopes(self, some: slice = slice(None)) -> Array:
+    def marker_slopes(self, some: slice) -> Array:
         """Return (F, nv, 3K) of some frames: the gradient's change per metre of every model marker's place in the axes
         of its segment.
         """

@@ -1,20 +1,58 @@
 """Checks that run before any statistics: a cause that a look at the recording settles is named here, and never
-fitted.
+fitted. Below what several checks share: what readers decided against the files or left out, and what markers do that
+nobody can.
 """
 
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, TypeVar, cast
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import About, CauseWords, CheckKind
+from biodance.lab.markers.sets import canonical, read_marker_set
+from biodance.lab.markers.signals import FaultyMarker, MarkerFault, faulty_markers
 from biodance.motion.contact import Contact
 from biodance.motion.newton import LagAndMass, newton_of
-from biodance.records import Session, Subject, Trial
+from biodance.records import Defect, Markers, Session, Subject, Trial
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One thing about a plate that is followed over time.
+
+    Parameters
+    ----------
+    name, unit : str
+        ``place_x`` and its unit.
+    effect, target : str
+        Name in `biodance.effects` of the cause of a wrong value, and where on the plate.
+    typical : float
+        Usual standard deviation from visit to visit in a laboratory without fault: where an archive of few visits
+        starts from.
+    matters : float
+        Smaller changes are listed, but are no finding.
+    share : float
+        Of the alarms that chance may raise: more where evidence is thin.
+    norm : float
+        Standard deviation of what is expected of a plate without fault, the same in all visits of a laboratory (where
+        it puts its toe marker): it blurs the level, not a change.
+    """
+
+    name: str
+    unit: str
+    effect: str
+    target: str
+    typical: float
+    matters: float
+    share: float
+    norm: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.typical <= 0:
+            raise ValueError(f"Quantity {self.name}: typical = {self.typical} must be positive.")
 
 
 @dataclass(frozen=True)
@@ -192,3 +230,57 @@ def overruled_files(session: Session, patterns: dict[str, str], *, check: str, e
 def _plate(sentence: str) -> str:
     match = re.match(r"Plate (\d+)", sentence)
     return f"plate{match[1]}" if match else ""
+
+
+def checks_of_defects(session: Session, effect: str, *, check: str, quantity: str) -> tuple[QualityCheck, ...]:
+    """Return a failed ``check`` for every target at which readers left something out because of ``effect``: what was
+    seen in its first trial, and in which trials it is. None where nothing was left out.
+    """
+    first: dict[str, Defect] = {}
+    trials: dict[str, list[str]] = {}
+    for trial in session.trials:
+        for one in trial.defects:
+            if one.effect == effect:
+                first.setdefault(one.target, one)
+                trials.setdefault(one.target, []).append(trial.name)
+    found = []
+    for target, one in first.items():
+        text = f"{one.text} ({', '.join(trials[target])})"
+        found.append(QualityCheck(check, False, text, effect, target, one.size, quantity, one.unit, mended=True))
+    return tuple(found)
+
+
+def marker_checks(recorded: Recorded, fault: MarkerFault, effect: str) -> tuple[QualityCheck, ...]:
+    """Return a failed check for each marker with this ``fault``, with the trials and seconds, or one that says none
+    has it. Preparing a trial takes these frames out (`prepare`), so the rest is judged.
+    """
+    found: dict[str, list[tuple[FaultyMarker, str]]] = {}
+    trials = recorded.once(_faulty)
+    for trial, markers, faults in trials:
+        for one in faults:
+            if one.fault is fault:
+                found.setdefault(one.label, []).append((one, f"{trial.name} {one.when(markers.time)}"))
+    check = f"{fault.value} markers"
+    if not found:
+        return (QualityCheck(check, True, f"No marker shows a {fault.value} frame."),) if trials else ()
+    return tuple(
+        QualityCheck(check, False, _said(places), effect, label, mended=True) for label, places in found.items()
+    )
+
+
+def _faulty(recorded: Recorded) -> list[tuple[Trial, Markers, tuple[FaultyMarker, ...]]]:
+    """Return the trials that have markers, with those of its set and their faults of every kind."""
+    trials = [(trial, _worn(trial)) for trial in recorded.session.trials if trial.markers is not None]
+    return [(trial, markers, faulty_markers(markers)) for trial, markers in trials]
+
+
+def _worn(trial: Trial) -> Markers:
+    """Return the markers of the trial's set, under the names that preparing gives them; all where no set is known."""
+    assert trial.markers is not None
+    return canonical(trial.markers, read_marker_set(trial.marker_set)) if trial.marker_set else trial.markers
+
+
+def _said(places: list[tuple[FaultyMarker, str]]) -> str:
+    """Return one sentence for a marker in several trials."""
+    size = max(one.size for one, _ in places)
+    return replace(places[0][0], size=size).sentence("; ".join(where for _, where in places))

@@ -18,17 +18,53 @@ from biodance.lab.c3d.raw import RawC3d
 from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
-CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
-FOUR_SENSORS = (3, 6, 7)
-"""TYPEs whose ORIGIN holds the half distances a, b of four sensors and their depth."""
-CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
-"""What each channel (after the calibration matrix) holds: F force, M moment, L length."""
-_MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-_USUAL_TYPE = 2  # Three forces and three moments: taken for channels of which nothing else is said
-_NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
+
+@dataclass(frozen=True)
+class PlateType:
+    """What the outputs of a plate of one TYPE hold: its channels, or with a calibration matrix of so many ``inputs``
+    what that makes of them.
+
+    ``outputs`` by name: ``fx`` a force in N, ``mx`` a moment about the sensor in N·m, ``tz`` a free moment, ``px`` the
+    place of the pressure in m. Of four sensors at (a, b), (-a, b), (-a, -b), (a, -b), ``fz2`` is the force in the
+    second and ``fx12`` that in the first and second together.
+
+    From the names follow how many analog ``channels`` there are, the ``content`` of the outputs (F force, M moment, L
+    length), the ``vertical`` ones whose sum is the force along the plate's z, whether ORIGIN holds a, b and depth of
+    ``four_sensors``, and whether the point ``on_surface`` is told at which the force acts.
+    """
+
+    outputs: tuple[str, ...]
+    inputs: int
+    channels: int
+    content: str
+    vertical: tuple[int, ...]
+    four_sensors: bool
+    on_surface: bool
+
+
+def plate_type(*outputs: str, inputs: int = 0) -> PlateType:
+    """Return the type of a plate with these outputs, and with a calibration matrix if it has ``inputs``."""
+    content = "".join({"f": "F", "p": "L"}.get(name[0], "M") for name in outputs)
+    vertical = tuple(column for column, name in enumerate(outputs) if name.startswith("fz"))
+    sensors, point = outputs[0][-1].isdigit(), "L" in content
+    return PlateType(outputs, inputs, inputs or len(outputs), content, vertical, sensors, point)
+
 
 _SIX = ("fx", "fy", "fz", "mx", "my", "mz")
 _EIGHT = ("fx12", "fx34", "fy14", "fy23", "fz1", "fz2", "fz3", "fz4")
+PLATE_TYPES = {
+    1: plate_type("fx", "fy", "fz", "px", "py", "tz"),
+    2: plate_type(*_SIX),
+    3: plate_type(*_EIGHT),
+    4: plate_type(*_SIX, inputs=6),
+    5: plate_type(*_SIX, inputs=8),
+    6: plate_type(*(f"f{axis}{sensor}" for sensor in "1234" for axis in "xyz"), inputs=12),
+    7: plate_type(*_EIGHT, inputs=8),
+}
+"""The TYPEs of the C3D standard that can be computed."""
+_USUAL_TYPE = 2  # Three forces and three moments: taken for channels of which nothing else is said
+_NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
+
 _AROUND_NAMES = re.compile(r"force|moment|torque|[\s._+:-]", flags=re.IGNORECASE)
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 _WORDS = {"F": "force", "M": "moment", "L": "length"}
@@ -201,7 +237,7 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
 
 
 def plate_parameters(
-    raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float = 1.0, turn: Array | None = None
+    raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float, turn: Array | None = None
 ) -> PlateParameters:
     """Return the parameters of plate ``number`` (from 1), those that are ``told`` instead of the file's.
 
@@ -216,8 +252,8 @@ def plate_parameters(
     told, group = told or NOTHING_TOLD, raw.parameters.get("FORCE_PLATFORM", {})
     described = _numbers(group, "TYPE").size >= number
     kind = told.type or (int(_of_plate(group, "TYPE", (), number)) if described or not told.channels else _USUAL_TYPE)
-    if kind not in CHANNELS_OF_TYPE:
-        known = ", ".join(map(str, CHANNELS_OF_TYPE))
+    if kind not in PLATE_TYPES:
+        known = ", ".join(map(str, PLATE_TYPES))
         what = f" ({_NAMES_OF_TYPE[kind]})" if kind in _NAMES_OF_TYPE else ""
         raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
     if told.channels:
@@ -236,7 +272,7 @@ def plate_parameters(
     else:
         origin = told.origin / metres
     calibration = _calibration(group, kind, number) if told.sensitivity is None else told.sensitivity
-    need = (len(CONTENT[kind]), CHANNELS_OF_TYPE[kind])
+    need = (len(PLATE_TYPES[kind].outputs), PLATE_TYPES[kind].channels)
     if told.sensitivity is not None and told.sensitivity.shape != need:
         raise TrialRefused(
             f"the sensitivity in session.toml has the shape {told.sensitivity.shape}, TYPE {kind} needs {need}. Give "
@@ -275,7 +311,7 @@ def _told_columns(channels: Sequence[str | int], labels: tuple[str, ...]) -> Arr
 
 def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
     """Return the columns (from 0) of the plate's channels after checking their number and range."""
-    need = CHANNELS_OF_TYPE[kind]
+    need = PLATE_TYPES[kind].channels
     if listed.size < need:
         raise TrialRefused(
             f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again."
@@ -296,9 +332,9 @@ def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
 
 def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | None:
     """Return CAL_MATRIX (stored by columns unless MATRIX_STORE says BYROW); None for types without one."""
-    if kind not in _MATRIX_OF_TYPE:
+    if not PLATE_TYPES[kind].inputs:
         return None
-    rows, columns = _MATRIX_OF_TYPE[kind]
+    rows, columns = len(PLATE_TYPES[kind].outputs), PLATE_TYPES[kind].inputs
     stored = _numbers(group, "CAL_MATRIX", keep=True)
     by_row = "BYROW" in "".join(str(text) for text in group.get("MATRIX_STORE", [])).replace(" ", "").upper()
     shape = stored.shape[:2] if stored.ndim >= 2 else (rows, columns)
@@ -368,13 +404,13 @@ def _unit_factors(
     kind: int, told: ToldPlate, units: Sequence[str], metres: float
 ) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """Return the SI unit per unit of each channel (after the calibration matrix), and what was decided."""
-    content = CONTENT[kind]
+    content = PLATE_TYPES[kind].content
     listed = ", ".join(dict.fromkeys(unit or "(none)" for unit in units))
     assumed = {"F": 1.0, "M": metres, "L": metres}
     if told.sensitivity is not None:
         given = f"Units: channels in {listed} times the sensitivity in session.toml give N and N·m."
         return (1.0,) * len(content), (given,)
-    if kind in _MATRIX_OF_TYPE:
+    if PLATE_TYPES[kind].inputs:
         said = f"Units: channels in {listed} times CAL_MATRIX give N and N x {metres:g} m."
         return tuple(assumed[what] for what in content), (said,)
     factors, strange = [], {}

@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.plates import CONTENT, FOUR_SENSORS, PlateParameters
+from biodance.lab.plates import PLATE_TYPES, PlateParameters, PlateType
 from biodance.records import Array, Mask, runs
 from biodance.settings import TOUCH_FORCE
 
@@ -20,8 +20,8 @@ DEEPEST = 0.3  # m, no sensor lies farther below the surface
 EDGE = 0.02  # m by which a sensor or a centre of pressure may lie beyond the edge
 FARTHEST_PRESSURE = 1.5  # m: a centre of pressure farther away has no meaning
 _FARTHEST_ORIGIN, _CLOSEST_SENSORS = 2.0, 0.05  # m
-_VERTICAL = {3: (4, 5, 6, 7), 6: (2, 5, 8, 11), 7: (4, 5, 6, 7)}
-"""Columns (after the calibration matrix) whose sum is the force along the plate's z; column 2 for other TYPEs."""
+_SENSORS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+"""Where the four sensors of a plate lie, in a and b along its x and y."""
 _LOADED, _CONTACT = 0.05, 0.1  # share of the peak from which on a plate is loaded; s over which it must be
 _BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
 _NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
@@ -94,7 +94,7 @@ class PlateReading:
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
     """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
-    four = plate.type in FOUR_SENSORS
+    four = PLATE_TYPES[plate.type].four_sensors
     fits = []
     for unit in dict.fromkeys((metres, 0.001, 1.0)):
         x, y, depth = np.abs(plate.origin * unit)
@@ -118,6 +118,7 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
 
 def decode_plate(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array) -> PlateReading:
     """Return the reading of one plate; TrialRefused where corners or ORIGIN make no sense, or no sample is known."""
+    kind = PLATE_TYPES[plate.type]
     corners, corners_said = corners_in_lab(plate.corners, metres=metres, turn=turn)
     half = half_sides(corners)
     origin, origin_said = _origin(plate, half, metres)
@@ -127,19 +128,19 @@ def decode_plate(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array
         output = samples if plate.calibration is None else samples @ plate.calibration.T
         return output * plate.factors
 
-    # TYPE 1 gives a point on the surface, four sensors lie around the axis: only x, y or only z leads to the centre
-    used = [False, False, True] if plate.type in FOUR_SENSORS else [True, True, plate.type != 1]
+    # A point on the surface, or four sensors around the axis: only x, y or only z leads to the centre.
+    used = [False, False, True] if kind.four_sensors else [True, True, not kind.on_surface]
     vector = np.where(used, origin, 0.0)
     channels, known, gaps_said = _without_gaps(np.asarray(raw.analog[:, plate.channels], dtype=float), plate)
-    vertical = in_si(channels)[:, _VERTICAL.get(plate.type, (2,))].sum(axis=1)
+    vertical = in_si(channels)[:, kind.vertical].sum(axis=1)
     zero = find_baseline(vertical, zero=plate.zero, rate=raw.analog_rate)
     offsets = np.zeros(channels.shape[1])
     if zero.stop > zero.start:
         offsets = channels[zero.start : zero.stop].mean(axis=0)
-        if plate.type == 1:  # where an empty plate is pressed has no zero
-            offsets = np.where([kind == "L" for kind in CONTENT[1]], 0.0, offsets)
-    sensor = sensor_wrench(plate.type, in_si(channels - offsets), origin)
-    empty = sensor_wrench(plate.type, in_si(offsets[None]), origin)[0, :3]
+        if kind.on_surface:  # where an empty plate is pressed has no zero
+            offsets = np.where([what == "L" for what in kind.content], 0.0, offsets)
+    sensor = sensor_wrench(kind, in_si(channels - offsets), origin)
+    empty = sensor_wrench(kind, in_si(offsets[None]), origin)[0, :3]
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
     said = Decisions((first, *told), corners_said, origin_said, plate.units_said, gaps_said, (), (zero.said,))
@@ -272,42 +273,30 @@ def _range(values: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def sensor_wrench(kind: int, signals: Array, origin: Array) -> Array:
+def sensor_wrench(kind: PlateType, signals: Array, origin: Array) -> Array:
     """Return force and moment (S, 6) N, N·m about the sensor, plate axes, from the output (S, C) in SI of a plate.
 
-    ==========  =====================================================================================================
-    TYPE        formula
-    ==========  =====================================================================================================
-    1           ``F``, a point ``p`` on the surface and a free moment ``T``: ``M = p x F + T``, about the point of the
-                surface above the sensor. A point farther than 1.5 m away, as an empty plate gives it, counts as 0.
-    3, 7        four vertical sensors at (a, b), (-a, b), (-a, -b), (a, -b), a and b from ORIGIN; x12, x34, y14, y23
-                are sums of two sensors: ``Mx = b (z1 + z2 - z3 - z4)``, ``My = a (-z1 + z2 + z3 - z4)``,
-                ``Mz = b (x34 - x12) + a (y14 - y23)``
-    6           the same of three components x, y, z at each of four corners
-    2, 4, 5     the wrench itself
-    ==========  =====================================================================================================
+    A force of a sensor at ``p`` adds ``p x F`` to the moment, that of two sensors at the middle between them, any other
+    nothing: ``Mx = b (z1 + z2 - z3 - z4)``, ``My = a (-z1 + z2 + z3 - z4)``, ``Mz = b (x34 - x12) + a (y14 - y23)``.
+    TYPE 1 holds the force ``F``, a point ``p`` on the surface and a free moment ``T``: ``M = p x F + T``, about the
+    point of the surface above the sensor. A point farther than 1.5 m away, as an empty plate gives it, counts as 0.
 
-    ``kind`` is the C3D TYPE; ``origin`` (3,) m is ORIGIN. The sign is that of the channels.
+    ``origin`` (3,) m is ORIGIN. The sign is that of the channels.
     """
-    if kind == 1:
+    if kind.on_surface:
         fx, fy, fz, x, y, free = signals.T
         # The point of an empty plate is noise.
         x, y = np.where(np.maximum(np.abs(x), np.abs(y)) > FARTHEST_PRESSURE, 0.0, (x, y))
         # p x F for p = (x, y, 0).
         return np.column_stack([fx, fy, fz, y * fz, -(x * fz), free + (x * fy - y * fx)])
-    if kind not in FOUR_SENSORS:
-        return signals
-    if kind == 6:
-        # (corner, component, sample) to (component, corner, sample).
-        x, y, (z1, z2, z3, z4) = signals.T.reshape(4, 3, -1).swapaxes(0, 1)
-        x12, x34, y14, y23 = x[0] + x[1], x[2] + x[3], y[0] + y[3], y[1] + y[2]
-    else:
-        x12, x34, y14, y23, z1, z2, z3, z4 = signals[:, :8].T
-    a, b = np.abs(origin[:2])
-    about_x, about_y = b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4)
-    # x F_y - y F_x, sensor by sensor.
-    about_z = b * (x34 - x12) + a * (y14 - y23)
-    return np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4, about_x, about_y, about_z], axis=1)
+    wrench = np.zeros((len(kind.outputs), 6))
+    for column, name in enumerate(kind.outputs):
+        axis = "xyz".index(name[1])
+        wrench[column, axis + 3 * (name[0] == "m")] = 1.0
+        if sensors := [int(number) - 1 for number in name[2:]]:
+            place = np.append(_SENSORS[sensors].mean(axis=0) * np.abs(origin[:2]), 0.0)
+            wrench[column, 3:] = np.cross(place, np.eye(3)[axis])
+    return np.asarray(signals[:, : len(wrench)] @ wrench)
 
 
 def loaded_samples(wrench: Array, rate: float) -> Mask:
@@ -323,11 +312,6 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
     # The last block is not whole: as the one before.
     lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
     return lasting & (np.abs(wrench[:, 2]) >= threshold)
-
-
-def left_out_said(number: int, why: TrialRefused | str) -> str:
-    """Return the sentence that a plate is not used."""
-    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
 
 
 def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:

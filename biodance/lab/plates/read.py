@@ -30,10 +30,9 @@ from biodance.lab.plates.decode import (
     PlateReading,
     block_means,
     decode_plate,
-    left_out_said,
     plate_axes,
 )
-from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
+from biodance.lab.plates.sense import left_out_said, sense_plates, with_loads_on_plates
 from biodance.records import Array, Defect, Markers, Plate, Trial, Wrench, grouped
 from biodance.records.attention import Doubt, WrongWeight
 from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE, CheckLimits, StandingRules

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.lab.plates import CONTENT, FOUR_SENSORS
-from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading, left_out_said
+from biodance.lab.plates import PLATE_TYPES
+from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading
 from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
@@ -128,7 +128,7 @@ def with_loads_on_plates(readings: Sequence[PlateReading]) -> tuple[list[PlateRe
 def _with_origin_turned(reading: PlateReading, loaded: Mask) -> PlateReading:
     """Return the reading, ORIGIN x, y turned where only that puts the load on the plate."""
     x, y, _ = reading.vector
-    if reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < _LEAST_BESIDE:
+    if PLATE_TYPES[reading.plate.type].four_sensors or np.hypot(x, y) < _LEAST_BESIDE:
         return reading
     pressed, vector = replace(reading, sensor=reading.sensor[loaded]), reading.vector * _HALF_TURN
     written, turned = _share_on_plate(pressed), _share_on_plate(replace(pressed, vector=vector))
@@ -145,7 +145,7 @@ def _with_origin_turned(reading: PlateReading, loaded: Mask) -> PlateReading:
 def _with_moments_in_unit(reading: PlateReading, loaded: Mask) -> PlateReading:
     """Return the reading with moments in the unit, declared or else only one, that puts the load on the plate."""
     plate, pressed, inside, good = reading.plate, reading.sensor[loaded], 0.0, []
-    for factor in _MOMENT_UNITS if "M" in CONTENT[plate.type] else _MOMENT_UNITS[:1]:
+    for factor in _MOMENT_UNITS if "M" in PLATE_TYPES[plate.type].content else _MOMENT_UNITS[:1]:
         tried = pressed * np.array([1, 1, 1, factor, factor, factor])
         share = _share_on_plate(replace(reading, sensor=tried))
         # moments that are 1000 times too small lie on every plate: at its centre, where nobody's pressure stays
@@ -264,6 +264,11 @@ def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array
     return wrench_about_origin(np.hstack([force, moment]), centre)
 
 
+def left_out_said(number: int, why: TrialRefused | str) -> str:
+    """Return the sentence that a plate is not used."""
+    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
+
+
 def sense_plates(
     readings: Sequence[PlateReading], time: Array, markers: Markers | None
 ) -> tuple[tuple[Plate, ...], _Said]:
@@ -366,7 +371,7 @@ def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, s
     if not sign or reading.axes[2, 2] <= 0:
         return "", ""
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
-    if reading.plate.type not in (3, 7):
+    if len(PLATE_TYPES[reading.plate.type].outputs) != 8:
         return f"{said}.", ""
     doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order."
     return doubt, doubt
@@ -375,7 +380,8 @@ def _direction_said(reading: PlateReading, sign: int, sway: int) -> tuple[str, s
 def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers | None) -> tuple[PlateReading, _Said]:
     """Return the reading, ORIGIN x, y turned where only that puts the load under the feet, and what was decided."""
     x, y, _ = 1000 * reading.vector
-    if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * _LEAST_BESIDE:
+    four = PLATE_TYPES[reading.plate.type].four_sensors
+    if markers is None or four or np.hypot(x, y) < 1000 * _LEAST_BESIDE:
         return reading, ()
     other = replace(reading, vector=reading.vector * _HALF_TURN)
     written, turned = _distance(reading, time, markers), _distance(other, time, markers, throughout=True)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict
 from biodance.errors import SessionRefused, TrialRefused, UnknownName, did_you_mean
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.markers.sets import MARKED_SEGMENTS
-from biodance.lab.plates import CHANNELS_OF_TYPE, CONTENT, ToldPlate, channel_groups, plate_parameters
+from biodance.lab.plates import PLATE_TYPES, ToldPlate, channel_groups, plate_parameters
 from biodance.lab.plates.decode import DEEPEST, LONGEST_SIDE, SHORTEST_SIDE, corners_in_lab
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Plate, Session, Trial
@@ -278,8 +278,8 @@ def told_plate(name: str, entry: PlateEntry) -> ToldPlate:
         raise SessionRefused(f"[plates.{name}] is no plate. Legal names are plate1, plate2 ..., as inspect shows them.")
     where = f"[plates.{name}]"
     kind = entry.type
-    if kind is not None and (type(kind) not in (int, float) or kind not in CHANNELS_OF_TYPE):
-        legal = ", ".join(map(str, CHANNELS_OF_TYPE))
+    if kind is not None and (type(kind) not in (int, float) or kind not in PLATE_TYPES):
+        legal = ", ".join(map(str, PLATE_TYPES))
         raise SessionRefused(f"{where} type = {kind!r} is not legal. Legal are the TYPEs {legal} of the C3D standard.")
     kind = None if kind is None else int(kind)
     channels = None if entry.channels is None else _channels(entry.channels, kind, where)
@@ -328,7 +328,7 @@ def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...]
     channels: list[Any] = [int(c) if isinstance(c, float) and c == round(c) and c >= 1 else c for c in listed]
     if not all((isinstance(c, str) and c.strip()) or (type(c) is int and c >= 1) for c in channels):
         raise SessionRefused(f"{where} channels = {value!r} is not legal. Write {legal}.")
-    counts = {CHANNELS_OF_TYPE[kind]} if kind else set(CHANNELS_OF_TYPE.values())
+    counts = {PLATE_TYPES[kind].channels} if kind else {one.channels for one in PLATE_TYPES.values()}
     if len(channels) not in counts or len(set(channels)) < len(channels):
         need = " or ".join(map(str, sorted(counts)))
         of = f" of TYPE {kind}" if kind else ""
@@ -338,8 +338,8 @@ def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...]
 
 def _sensitivity(value: Any, kind: int | None, channels: tuple[str | int, ...] | None, where: str) -> Array:
     """Return the matrix (rows, channels) of a list of numbers, which is its diagonal, or of a list of rows."""
-    columns = CHANNELS_OF_TYPE[kind] if kind else len(channels or ()) or 6
-    rows = len(CONTENT[kind]) if kind else columns
+    columns = PLATE_TYPES[kind].channels if kind else len(channels or ()) or 6
+    rows = len(PLATE_TYPES[kind].outputs) if kind else columns
     legal = (
         f"one number for each channel ({columns}), or {rows} rows of {columns} numbers: N and N·m per unit of the "
         f"channel as the file gives it"

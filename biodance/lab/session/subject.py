@@ -141,7 +141,7 @@ def identify_subject(
     trials: Sequence[Trial],
     *,
     name: str,
-    devices: Mapping[str, float] = NOTHING_WORN,
+    devices: Mapping[str, float],
 ) -> tuple[Subject, tuple[str, ...]]:
     """Return the subject and the notes: what was guessed, what contradicts what.
 

@@ -121,7 +121,7 @@ def better(one: Minimum, other: Minimum) -> Minimum:
 _OTHERS = 0.01  # Weight of other segments' markers in the root's rigid fit, for where its own are hidden
 
 
-def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
+def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None) -> Array:
     """Return q (F, nq): angles at a ``share`` of their range (None: zero), the root where its markers say."""
     lower, upper = problem.chain.lower, problem.chain.upper
     angles = np.clip(np.zeros(len(lower)), lower, upper)

@@ -327,7 +327,7 @@ def copy_dance(
     *,
     centre: Array,
     heading: float = 0.0,
-    performer: Performer = Performer(),
+    performer: Performer,
     tolerances: LabTolerances = REALISTIC,
 ) -> Performance:
     """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; reproducible."""

@@ -270,7 +270,7 @@ Height = Callable[[Person, Pose, Curves, FootStance, Array], Array]
 
 
 def stand_on_feet(
-    person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array, *, height: Height = pelvis_height
+    person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array, *, height: Height
 ) -> Array:
     """Return q (T, 46) with the pelvis over ``xy`` (T, 2) m and the legs that hold the planted feet exactly still."""
     q = pose.q.copy()

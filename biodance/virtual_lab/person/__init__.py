@@ -72,7 +72,7 @@ def draw_sip(
     seed: int,
     *,
     tolerances: skeleton.LabTolerances,
-    population: int | None = None,
+    population: int | None,
 ) -> Sip:
     """Draw the true parameters of the 16 segments; their masses add up to the subject's exactly.
 

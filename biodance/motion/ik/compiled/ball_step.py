@@ -16,7 +16,7 @@ of the exact turn.
 _UPRIGHT = 0.3  # Cosine of the second angle above which the angles are a good measure of the rotation
 
 
-_EQUAL = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
+EQUAL_ANGLES = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
 
 
 @compiled
@@ -86,7 +86,7 @@ def _angles_of(quaternion, sign, near, lower, upper, out):
     other = beyond(a1, lower[0], upper[0]) + beyond(b1, lower[1], upper[1]) + beyond(c1, lower[2], upper[2])
     away = abs(a0 - near[0]) + abs(b0 - near[1]) + abs(c0 - near[2])
     away_other = abs(a1 - near[0]) + abs(b1 - near[1]) + abs(c1 - near[2])
-    if other < outside - _EQUAL or (other < outside + _EQUAL and away_other < away):
+    if other < outside - EQUAL_ANGLES or (other < outside + EQUAL_ANGLES and away_other < away):
         out[0], out[1], out[2] = a1, b1, c1
     else:
         out[0], out[1], out[2] = a0, b0, c0
@@ -174,6 +174,6 @@ def continue_angles(chain, q):
                 other[k] = _near_to(turned_over, _middle_of(lower, upper, before[k]))
                 inside = inside and beyond(other[k], lower, upper) == 0
                 nearer += abs(own[k] - before[k]) - abs(other[k] - before[k])
-            if inside and (nearer > _EQUAL or (nearer > -_EQUAL and np.cos(own[1]) < 0)):
+            if inside and (nearer > EQUAL_ANGLES or (nearer > -EQUAL_ANGLES and np.cos(own[1]) < 0)):
                 own[:] = other
             before[:] = own
