@@ -209,15 +209,17 @@ _BEYOND = np.radians(25.0)
 """rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
 in many places where the model has one joint, marker sets turn the axes, and skin slides.
 """
-_HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
-"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
+_BACKWARDS = np.radians(10.0)
+"""rad beyond straight to which hinges go: knees and elbows of healthy people bend backwards by 0 to 10 degrees (AAOS
+1965), and markers set the zero. Farther, markers of a wrist with exchanged names are followed by an elbow bent back.
+"""
 _SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
 def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside
-    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, and all but knees,
-    elbows and that turn by ``BEYOND`` more. The notes name what this posture changed.
+    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, hinges ``BACKWARDS``,
+    and all others by ``BEYOND`` more. The notes name what this posture changed.
 
     Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
     stands tilted.
@@ -234,8 +236,9 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     lower, upper = (
         np.where(named("_shoulder_rotation"), *pair) for pair in ((-_HAND_TURN, lower), (_HAND_TURN, upper))
     )
-    free = _BEYOND * (1.0 - named(*_HELD))
-    lower, upper = lower - free, upper + free
+    hinge = named("_knee_flexion", "_elbow_flexion")
+    free = _BEYOND * (1.0 - hinge - named("_shoulder_rotation"))
+    lower, upper = lower - free - _BACKWARDS * hinge, upper + free
     low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
         f"Range of {name.replace('_', ' ')} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} "
