@@ -209,17 +209,19 @@ _BEYOND = np.radians(25.0)
 """rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
 in many places where the model has one joint, marker sets turn the axes, and skin slides.
 """
+_HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
+"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
 _BACKWARDS = np.radians(10.0)
-"""rad beyond straight to which hinges go: knees and elbows of healthy people bend backwards by 0 to 10 degrees (AAOS
-1965), and markers set the zero. Farther, markers of a wrist with exchanged names are followed by an elbow bent back.
+"""rad beyond straight to which knees and elbows of healthy people bend (American Academy of Orthopaedic Surgeons 1965:
+0 to 10 degrees); the markers set the zero besides.
 """
 _SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
 def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside
-    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, hinges ``BACKWARDS``,
-    and all others by ``BEYOND`` more. The notes name what this posture changed.
+    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, and all but knees,
+    elbows and that turn by ``BEYOND`` more. The notes name what this posture changed.
 
     Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
     stands tilted.
@@ -236,9 +238,8 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     lower, upper = (
         np.where(named("_shoulder_rotation"), *pair) for pair in ((-_HAND_TURN, lower), (_HAND_TURN, upper))
     )
-    hinge = named("_knee_flexion", "_elbow_flexion")
-    free = _BEYOND * (1.0 - hinge - named("_shoulder_rotation"))
-    lower, upper = lower - free - _BACKWARDS * hinge, upper + free
+    free = _BEYOND * (1.0 - named(*_HELD))
+    lower, upper = lower - free, upper + free
     low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
         f"Range of {name.replace('_', ' ')} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} "
@@ -258,6 +259,15 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
 def with_tracking_limits(body: Body) -> Body:
     """Return a body without a static trial with the limits for tracking, counted from the neutral posture."""
     return replace(body, limits=widen_limits(body, body.neutral)[0])
+
+
+def with_hinges_past_straight(body: Body) -> Body:
+    """Return a body whose knees and elbows are followed ``BACKWARDS`` beyond straight. Only one whose joints are placed
+    and chosen: before, the markers of a forearm that turns bend an elbow without pronation back.
+    """
+    hinge = [joint.name.endswith(("_knee_flexion", "_elbow_flexion")) for joint in body.joints]
+    lower = np.where(hinge, np.minimum(body.limits.lower, -_BACKWARDS), body.limits.lower)
+    return replace(body, limits=replace(body.limits, lower=lower))
 
 
 def standing_tilt(q: Array) -> float:
