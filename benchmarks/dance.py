@@ -13,6 +13,7 @@ all the way from a template of limits to the subject's page with so many people 
 import argparse
 import json
 import resource
+import shutil
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -199,6 +200,7 @@ def visited(k: int, folder: Path) -> Row:
     found(kind, protocol, folder, (who, limits))
     dance, place = Dance.load(folder / f"{kind}_{protocol}.npz"), folder / f"visit_{k}"
     write_feedback(dance, folder / f"{kind}_{protocol}.html", force=True)
+    shutil.rmtree(place, ignore_errors=True)  # of a run that was stopped
     simulate(who, None, place, seed=_FIRST_VISITOR + k, dance=dance, performer="restless")
     result, told = diagnosed_and_corrected(examine(read_session(place)))
     account = account_for(as_diagnosed(result, told.diagnosis), told)

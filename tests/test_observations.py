@@ -141,19 +141,30 @@ def test_empty_plates_tell_what_was_taken_off() -> None:
     assert found["plate2 Fz, after less before"].value == pytest.approx(0.0)
 
 
-def test_flight_reads_what_a_plate_leaves() -> None:
+def lifted(fall: float) -> Trial:
+    """Return a walk with both feet 0.3 m up for 0.3 s at its end, of a body that falls with so many m/s² then; Fy of
+    plate1 reads 7 N.
+    """
     trial = walk()
-    names = trial.markers.names
-    up = np.array(trial.markers.xyz)
-    frames = (trial.markers.time > 2.3) & (trial.markers.time < 2.6)
-    up[np.ix_(frames, [names.index(n) for n in ("LHEE", "RHEE", "LTOE", "RTOE")], [2])] = 0.3
+    up, late = np.array(trial.markers.xyz), trial.markers.time - 2.45
+    frames = np.abs(late) < 0.15
+    up[frames, :, 2] -= fall / 2 * late[frames, None] ** 2
+    feet = [trial.markers.names.index(name) for name in ("LHEE", "RHEE", "LTOE", "RTOE")]
+    up[np.ix_(frames, feet, [2])] = 0.3 - fall / 2 * late[frames, None, None] ** 2
     left = np.array(trial.plates[0].wrench.value)
     left[trial.plates[0].wrench.time > 2.2, 1] = 7.0
     plate = replace(trial.plates[0], wrench=replace(trial.plates[0].wrench, value=left))
-    flown = replace(trial, markers=replace(trial.markers, xyz=up), plates=(plate, trial.plates[1]))
-    found = seen(flown, "flight")
+    return replace(trial, markers=replace(trial.markers, xyz=up), plates=(plate, trial.plates[1]))
+
+
+def test_flight_reads_what_a_plate_leaves() -> None:
+    found = seen(lifted(9.8), "flight")
     assert found["plate1 Fy in flight"].value == pytest.approx(7.0)
     assert found["plate2 Fz in flight"].value == pytest.approx(0.0)
+
+
+def test_who_sits_and_lifts_both_feet_does_not_fly() -> None:
+    assert not seen(lifted(0.0), "flight"), "a stool on the plates read 700 N in its flight"
 
 
 @pytest.mark.parametrize(

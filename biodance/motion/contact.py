@@ -63,13 +63,16 @@ def flight(trial: Trial, touching: Mask, load: Mask) -> Mask:
     unloaded = np.logical_not(load.any(axis=1))
     for free in (unloaded, unloaded & np.logical_not(touching.any(axis=1))):
         for start, stop in runs(free):
-            if not found[start] and _falls(trial, start, stop):
+            if not found[start] and falls_freely(trial, start, stop):
                 found[start:stop] = True
     return found
 
 
-def _falls(trial: Trial, start: int, stop: int) -> bool:
-    """Return whether markers of body or pelvis fall freely in frames ``start`` to ``stop``: a parabola of one g."""
+def falls_freely(trial: Trial, start: int, stop: int) -> bool:
+    """Return whether markers of body or pelvis fall freely in frames ``start`` to ``stop``: a parabola of one g.
+
+    Who sits with both feet up does not, nor who hangs.
+    """
     if trial.markers is None or trial.markers.time.size < 2:
         return False
     span = slice(max(0, start - 1), min(trial.markers.time.size, stop + 1))

@@ -1,11 +1,10 @@
 """Flight: nobody touches anything, so every plate reads exactly zero and gravity is the only force."""
 
-from functools import lru_cache
-
 import numpy as np
 
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
+from biodance.motion.contact import falls_freely
 from biodance.observations import FootPath, Observation, Observer, SeenTrial
 from biodance.observations._causes import Sensitivity, of_mean
 from biodance.records import Array, runs
@@ -33,7 +32,7 @@ class Flight(Observer):
         heights = [plate.height for plate in seen.trial.plates]
         if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:
             return ()
-        spans = _in_air(seen.feet)
+        spans = _in_air(seen)
         found = []
         for plate in seen.trial.plates:
             wrench = plate.wrench
@@ -56,11 +55,12 @@ class Flight(Observer):
         return tuple(found)
 
 
-@lru_cache(maxsize=8)
-def _in_air(feet: tuple[FootPath, ...]) -> tuple[tuple[float, float], ...]:
-    """Return first and last time s of every flight; of the last feet it is kept."""
-    air, time = np.min([_height(foot) for foot in feet], axis=0) > _HIGH, feet[0].time
-    return tuple((time[a], time[b - 1]) for a, b in runs(air) if b - a >= max(2, _SHORTEST * feet[0].rate))
+def _in_air(seen: SeenTrial) -> list[tuple[float, float]]:
+    """Return first and last time s of every flight: both feet are high, and the body falls (feet of who sits hang)."""
+    feet = seen.feet
+    high, time = np.min([_height(foot) for foot in feet], axis=0) > _HIGH, feet[0].time
+    long = [(a, b) for a, b in runs(high) if b - a >= max(2, _SHORTEST * feet[0].rate)]
+    return [(time[a], time[b - 1]) for a, b in long if falls_freely(seen.trial, a, b)]
 
 
 def _height(foot: FootPath) -> Array:

@@ -204,7 +204,8 @@ def write_dance(
         dance.save(folder / "dance.npz")
         if despite or not dance.unsafe:
             texts |= _leading(result, dance, folder, language)
-        left_out = "\n\n".join(("", "# What was left out or corrected", *result.left_out)) if result.left_out else ""
+        said = ("", "# What was left out or corrected", *result.left_out)
+        left_out = "\n\n".join(said) + "\n" if result.left_out else ""
         checked = "Checked on the finished dance, every 0.01 s, by other code than its design."
         margins = markdown_table(MARGIN_ROW, found["margins"])
         texts["margins.md"] = f"# What is left of every limit\n\n{checked}\n\n{margins}{left_out}"

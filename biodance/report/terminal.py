@@ -11,7 +11,7 @@ from rich.text import Text
 
 from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
-from biodance.display import cause_in_words
+from biodance.display import cause_in_words, spaced
 from biodance.doctor import MachineFinding
 from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
@@ -164,12 +164,12 @@ def _print_performance(found: Row, console: Console) -> None:
     """Print how well a dance was danced, and which transitions to dance once more."""
     print_line(console, f"dance {found['dance']}, share of the table's variance removed, reached (planned):")
     for row in found["excitation"]:
-        print_line(console, shown("  {segment}: {reached:%0} % ({planned:%0} %)", row))
+        print_line(console, shown(f"  {spaced(row['segment'])}: {{reached:%0}} % ({{planned:%0}} %)", row))
     for row in found["logs"]:
         print_line(console, f"log: {log_in_words(row)}")
     for row in found["repetitions"]:
         cues = f"repeat: cue {row['transition']} to {row['transition'] + 1}"
-        print_line(console, shown(cues + " (+{gain:%2} % in the mean, most in {most})", row))
+        print_line(console, shown(f"{cues} (+{{gain:%2}} % in the mean, most in {spaced(row['most'])})", row))
 
 
 def print_foresight(found: Row, console: Console) -> None:
