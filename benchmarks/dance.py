@@ -102,9 +102,7 @@ HEADING = (
 
 
 def found(name: str, protocol: str, folder: Path, who: tuple[Subject, PersonLimits] | None = None) -> Row:
-    """Return the numbers of the dance of one body (``who``, else that of this name) and protocol, designed if it is not
-    in the folder.
-    """
+    """Return the numbers of the dance of one body (``who``, else of this name), designed if not in the folder."""
     path = folder / f"{name}_{protocol}.json"
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))

@@ -39,9 +39,7 @@ CAMERA = 0.0003
 
 
 def dance(body: Body, frames: int, *, seed: int = 0) -> Array:
-    """Return q (frames, nq): postures held for a second and moved between in a second, the pelvis turning and
-    travelling.
-    """
+    """Return q (frames, nq): postures held and moved between, a second each, the pelvis turning and travelling."""
     rng, at = np.random.default_rng(seed), np.arange(frames) / RATE
     knots = np.arange(0.0, at[-1] + 2.0)
     lower, upper = body.limits.lower, body.limits.upper
@@ -110,9 +108,7 @@ def opensim_track(model: opensim.Model, body: Body, trc: Path, frames: int, accu
 
 
 def opensim_tool(folder: Path, body: Body, trc: Path, frames: int) -> float:
-    """Return CPU seconds per frame of OpenSim's InverseKinematicsTool with its defaults, model and files read
-    included.
-    """
+    """Return CPU seconds per frame of OpenSim's InverseKinematicsTool with its defaults, reading of files included."""
     tool = opensim.InverseKinematicsTool()
     tool.set_model_file(str(folder / "body.osim"))
     tool.setMarkerDataFileName(str(trc))

@@ -34,9 +34,7 @@ SECONDS, RATE, NOISE = 60.0, 100.0, (5.0, 2.0)
 
 @dataclass(frozen=True)
 class Score:
-    """Errors: mass, RMS and largest kg; CoM and inertia about it, median mm and %; wrench N, N·m; segments that
-    cannot exist.
-    """
+    """Errors: mass, RMS and largest kg; CoM and inertia, median mm and %; wrench N, N·m; impossible segments."""
 
     mass: float
     largest: float
@@ -49,9 +47,7 @@ class Score:
 
 
 def true_parameters(body: Body, rng: np.random.Generator) -> Array:
-    """Return a person of the same mass whose segments are stretched, shifted and heavier or lighter than the
-    table's.
-    """
+    """Return a person of the same mass whose segments are stretched, shifted, heavier or lighter than the table's."""
     bodies = []
     for phi in body.sip.phi.reshape(-1, 10):
         J = of_parameters(phi)
@@ -81,9 +77,7 @@ def dance(body: Body, rng: np.random.Generator) -> Motion:
 
 
 def measured(motion: Motion, rng: np.random.Generator) -> Motion:
-    """Return the motion as a laboratory finds it: every joint angle with a constant offset and a gain that is a
-    little wrong.
-    """
+    """Return the motion as a laboratory finds it: every joint angle with a constant offset, and a wrong gain."""
     q, v, a = np.array(motion.q), np.array(motion.v), np.array(motion.a)
     gain = 1 + 0.03 * rng.normal(size=v.shape[1] - 6)
     q[:, 7:] = q[:, 7:] * gain + np.radians(2.0) * rng.normal(size=gain.size)

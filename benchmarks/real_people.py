@@ -25,11 +25,10 @@ from biodance.lab.session.read import read_session
 from biodance.motion.dynamics import compare
 from biodance.pipeline.diagnosis import diagnosed_and_corrected
 from biodance.pipeline.session import examine, identification_of
-from biodance.records import Array, Markers, Role, Session, Trial, Wrench
+from biodance.records import CHANNELS, Array, Markers, Role, Session, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
 
 QUESTIONS = ("paper", "masses", "halves", "trials")
-CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 RUNNERS = tuple(f"rbds/S0{n}" for n in ("01", "03", "05", "09", "12", "16", "17", "18", "20", "24"))
 MAN = {"squats": (8.0, 27.5), "march": (27.5, 61.0)}
 """What one long table of the man of the paper's laboratory holds, s."""
@@ -56,17 +55,14 @@ def read(name: str, folder: Path) -> Session:
     """Return a session of the data as the command reads it; a single file lies alone in a folder below ``folder``."""
     place = Path(os.environ["BIODANCE_DATA"]) / name.partition(" ")[0]
     if place.is_file():
-        alone = folder / "sessions" / place.stem
-        alone.mkdir(parents=True, exist_ok=True)
+        (alone := folder / "sessions" / place.stem).mkdir(parents=True, exist_ok=True)
         place = Path(shutil.copy(place, alone)).parent
     return read_session(place)
 
 
 def split(session: Session, name: str, parts: dict[str, tuple[float, float]]) -> Session:
     """Return a session with ``parts``, first and last second by name, in the place of the trial ``name``."""
-    trial = session[name]
-    markers = trial.markers
-    new = []
+    trial, markers, new = session[name], session[name].markers, []
     for part, (start, end) in parts.items():
         seen, felt = ((time >= start) & (time < end) for time in (markers.time, trial.wrench.time))
         plates = [replace(one, wrench=Wrench(one.wrench.time[felt], one.wrench.value[felt])) for one in trial.plates]
@@ -81,15 +77,8 @@ def halves(session: Session, trial: str) -> Session:
     return split(session, trial, {"first": (-np.inf, middle), "second": (middle, np.inf)})
 
 
-def fitted_on(session: Session, fitted: str, hold: str) -> Session:
-    """Return a session whose moving trial ``fitted`` is fitted and ``hold`` kept, no other."""
-    return with_roles(session, {fitted: "fit", hold: "validate"})
-
-
 def first_half(session: Session, kind: str) -> Session:
-    """Return a session of which the first half of the moving trials whose names begin with ``kind`` is fitted, the
-    others kept.
-    """
+    """Return a session of which the first half of the trials whose names begin with ``kind`` is fitted, others kept."""
     names = [one.name for one in session.trials if one.role != "static" and one.name.startswith(kind)]
     return with_roles(session, {name: "fit" if 2 * k < len(names) - 1 else "validate" for k, name in enumerate(names)})
 
@@ -105,7 +94,7 @@ def sessions(question: str, folder: Path) -> dict[str, Callable[[], Session]]:
     made: dict[str, Callable[[], Session]] = {}
 
     def add(name: str, whole: Callable[[], Session], fitted: str, hold: str) -> None:
-        made[name] = lambda: fitted_on(whole(), fitted, hold)
+        made[name] = lambda: with_roles(whole(), {fitted: "fit", hold: "validate"})
 
     if question == "paper":
         for fitted, hold in (("march", "squats"), ("squats", "march")):
@@ -121,34 +110,26 @@ def sessions(question: str, folder: Path) -> dict[str, Callable[[], Session]]:
 
 
 def judged(session: Session) -> Row:
-    """Return what was corrected, and what table and identified body leave of kept trials; or why nothing was found."""
-    result = diagnosed_and_corrected(examine(session))[0]
-    row: Row = {"cutoff": {one.name: one.trial.settings.filter.cutoff for one in result.trials}}
+    """Return what table and identified body leave of kept trials, or why nothing was found."""
     try:
-        found = identification_of(result)
+        found = identification_of(diagnosed_and_corrected(examine(session))[0])
     except SessionRefused as why:
-        return {**row, "refused": str(why)}
-    told = [(one.effect, one.target, [(p.value, p.sd) for p in one.parameters]) for one in found.corrected]
-    left = {one.name: residuals(one) for one in found.validations}
-    return {**row, "corrected": told, "kept": left, "gain": asdict(found.gain) if found.gain else None}
+        return {"refused": str(why)}
+    return {"kept": list(map(residuals, found.validations)), "gain": asdict(found.gain) if found.gain else None}
 
 
 def residuals(one: TrialValidation) -> Row:
-    """Return RMS differences (6,) N, N·m in a kept trial, and for how many seconds they were measured."""
-    weighed = Wrench(one.table.time, one.weighed * one.table.value)
-    rms = {"table": one.table_agreement.rms, "identified": one.identified_agreement.rms}
-    if one.extended_agreement is not None:
-        rms["extended"] = one.extended_agreement.rms
-    return {**rms, "weighed": compare(one.measured, weighed, one.use).rms, "seconds": one.use.sum() / one.measured.rate}
+    """Return RMS differences (6,) N, N·m in a kept trial, ``extended`` with skin, flesh and joints if told; seconds."""
+    weighed = compare(one.measured, Wrench(one.table.time, one.weighed * one.table.value), one.use)
+    extended = one.extended_agreement or one.identified_agreement
+    found = {"table": one.table_agreement, "identified": one.identified_agreement, "extended": extended}
+    rms = {name: agreement.rms for name, agreement in (found | {"weighed": weighed}).items()}
+    return {**rms, "seconds": one.use.sum() / one.measured.rate}
 
 
-def ratios(row: Row, which: str = "identified") -> Array:
-    """Return residuals (6,) in kept trials: of the identified body, or that with skin, flesh and joints ("extended"),
-    over those of the table with the weighed mass.
-    """
-    kept = [one if which in one else {**one, which: one["identified"]} for one in row["kept"].values()]
-    names = (which, "weighed")
-    own, table = (sum(one["seconds"] * np.square(one[name]) for one in kept) for name in names)
+def ratios(row: Row, which: str) -> Array:
+    """Return residuals (6,) in kept trials: of one of the bodies, over those of the table with the weighed mass."""
+    own, table = (sum(one["seconds"] * np.square(one[name]) for one in row["kept"]) for name in (which, "weighed"))
     return np.asarray(np.sqrt(own / table))
 
 
@@ -156,7 +137,7 @@ def told(name: str, row: Row) -> str:
     """Return a row of the table of kept trials."""
     if not row.get("kept"):
         return f"| {name} | {row.get('refused', 'no kept trial')} |"
-    rms = [np.mean([one[which] for one in row["kept"].values()], axis=0) for which in ("table", "identified")]
+    rms = [np.mean([one[which] for one in row["kept"]], axis=0) for which in ("table", "identified")]
     means = [" -> ".join(f"{one[part].mean():.1f}" for one in rms) for part in (slice(0, 3), slice(3, 6))]
     gain, wide = row["gain"] or {}, "{:.2f} ({:.2f} to {:.2f})"
     sure = [wide.format(gain[key], *gain[f"{key}_interval"]) for key in ("force", "moment") if gain]

@@ -12,7 +12,7 @@ from biodance.body.human.measures import (
     Measures,
 )
 from biodance.body.human.scaling import chain_angles, measure_static
-from biodance.body.human.skeleton import standing_tilt, with_hinges_past_straight
+from biodance.body.human.skeleton import standing_tilt
 from biodance.body.human.static_centres import arm_centres
 from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused
@@ -192,17 +192,6 @@ def test_knees_and_elbows_still_do_not_bend_backwards() -> None:
     for joint in ("right_knee_flexion", "left_knee_flexion", "right_elbow_flexion", "left_elbow_flexion"):
         j = body.joint_index(joint)
         assert body.limits.lower[j] == pytest.approx(min(human(SUBJECT).limits.lower[j], q[7 + j] - np.radians(5.0)))
-
-
-@pytest.mark.parametrize("joint", ["right_knee_flexion", "left_elbow_flexion"])
-def test_hinges_that_bend_backwards_are_followed_exactly_once_joints_are_placed(joint: str) -> None:
-    body, q = scaled(SUBJECT, standing_trial())
-    body = with_hinges_past_straight(body)
-    q[7 + body.joint_index(joint)] = np.radians(-9.0)
-    there = Markers(body.markers.names, [0.0], poses(body, q[None]).points(body.markers.segment, body.markers.position))
-    found = solve_ik(body, there)
-    assert found.residual.max() < 1e-6
-    assert found.q[0, 7 + body.joint_index(joint)] == pytest.approx(np.radians(-9.0), abs=1e-5)
 
 
 def test_a_typed_width_that_contradicts_the_markers_is_warned_about() -> None:

@@ -67,7 +67,9 @@ def test_what_a_dance_teaches_and_does_not_leads_and_the_rest_is_folded() -> Non
     found, dance = foresee(body(), (motion(1),), tolerances=known(), effects=CHOSEN), small_dance()
     document = foresight_document(found, known=expect(dance, steps=1))
     assert document["learned"].startswith("Masses that it teaches (by the table alone): ")
-    assert "left forearm with hand ±" not in document["learned"], "an arm that is lifted once teaches not its hand"
+    assert "left upper arm ±" in document["learned"], "the arm that is lifted"
+    assert "right upper arm ±" not in document["learned"], "the arm that hangs"
+    assert "right forearm with hand ±" not in document["learned"]
     assert len(seen_causes(document)) == len(found.seen) > 0
     page = foresight_page(document, "the dance")
     order = ["What it can tell", "What it cannot tell", "What to change", "<details>", "What looks alike"]

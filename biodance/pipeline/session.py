@@ -7,7 +7,6 @@ from itertools import repeat
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.skeleton import with_hinges_past_straight
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.loads import with_declared_limbs
@@ -93,7 +92,6 @@ def _placed(
         plain, limbs = with_declared_limbs(plain, subject)
         source = f"{source} {limbs}".strip()
     body, gains = shown_joints(plain, read, steps)
-    body, plain = map(with_hinges_past_straight, (body, plain))
     return Placed(body, source, plain, gains, prior, tuple(steps), known, hidden)
 
 

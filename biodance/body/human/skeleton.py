@@ -211,10 +211,6 @@ in many places where the model has one joint, marker sets turn the axes, and ski
 """
 _HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
 """Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
-_BACKWARDS = np.radians(10.0)
-"""rad beyond straight to which knees and elbows of healthy people bend (American Academy of Orthopaedic Surgeons 1965:
-0 to 10 degrees); the markers set the zero besides.
-"""
 _SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
@@ -259,15 +255,6 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
 def with_tracking_limits(body: Body) -> Body:
     """Return a body without a static trial with the limits for tracking, counted from the neutral posture."""
     return replace(body, limits=widen_limits(body, body.neutral)[0])
-
-
-def with_hinges_past_straight(body: Body) -> Body:
-    """Return a body whose knees and elbows are followed ``BACKWARDS`` beyond straight. Only one whose joints are placed
-    and chosen: before, the markers of a forearm that turns bend an elbow without pronation back.
-    """
-    hinge = [joint.name.endswith(("_knee_flexion", "_elbow_flexion")) for joint in body.joints]
-    lower = np.where(hinge, np.minimum(body.limits.lower, -_BACKWARDS), body.limits.lower)
-    return replace(body, limits=replace(body.limits, lower=lower))
 
 
 def standing_tilt(q: Array) -> float:
