@@ -149,3 +149,6 @@ def test_the_sentence_names_what_moves_only_where_it_is_told() -> None:
     gain = {"mass": share, "distribution": share, "tissue": None}
     assert "skin" not in parted_gain(gain)
     assert "25.0 % (20.0 to 30.0) skin, flesh and joints" in parted_gain({**gain, "tissue": share})
+    for worse in ({"value": 0.03, "ci95": [-0.1, 0.2]}, {"value": -0.12, "ci95": None}):
+        assert parted_gain({**gain, "tissue": worse}).endswith("explains nothing of what is then left")
+        assert "-12" not in parted_gain({**gain, "tissue": worse})

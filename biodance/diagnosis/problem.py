@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
-from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.spectrum import SHORTEST_RUN, Spectrum, spectrum, thinned
 from biodance.discovery import Chosen
@@ -25,7 +24,7 @@ from biodance.lab.prepare import highest_frequency
 from biodance.motion.dynamics import regressor_of
 from biodance.records import Array, Motion, Sip, Trial, Wrench, runs
 from biodance.uncertainty.caution import widened_prior
-from biodance.uncertainty.sources import Errors, forward, of_clusters
+from biodance.uncertainty.sources import Errors, forward, of_clusters, of_whole
 from biodance.uncertainty.tolerances import in_state
 
 _LIGHTEST = 0.2
@@ -219,7 +218,7 @@ def problem(
     rows, unit = _kinematic_rows(where, _errors(body, cases, where), len(shown))
     W = W.reshape(-1, W.shape[2])
     sip = np.concatenate([W, np.zeros((len(rows) - len(W), W.shape[1]))])
-    groups = tuple(in_state(_of_whole(group, body), joint, body) for group, joint in unit)
+    groups = tuple(in_state(of_whole(group, body), joint, body) for group, joint in unit)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     markers = len(rows) - len(W) - len(shown)
@@ -236,15 +235,6 @@ def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[t
             size = one.shown(*cases)
             found[name, one.target] = 0.0 if size is None else float(size[0])
     return found
-
-
-def _of_whole(group: str, body: Body) -> str:
-    """Return a group of errors as that of the segment where it is one of a part: ``slide head`` -> ``slide
-    trunk_head``.
-    """
-    wholes = {kind_of(part.name): kind_of(body.segments[part.segment]) for part in body.parts}
-    quantity, _, target = group.partition(" ")
-    return f"{quantity} {wholes.get(target, target)}"
 
 
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> Iterator[tuple[int, NDArray[np.intp], Errors]]:

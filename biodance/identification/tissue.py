@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.tables.error_sizes import error_size
-from biodance.errors import UnknownName
 from biodance.identification.mismatch import long_runs
 from biodance.identification.statistics import START, WORTH, Fit, Statistics, empty
 from biodance.motion.dynamics import predict_wrench
@@ -30,7 +29,7 @@ from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.bands import BANDS, Noise
 from biodance.uncertainty.learning import maximise, noise_of
 from biodance.uncertainty.response import ErrorSource, Response
-from biodance.uncertainty.sources import Centre, Flesh, Sag, Slide, Tilt, deviations, of_clusters
+from biodance.uncertainty.sources import Centre, Flesh, Sag, Slide, Tilt, deviations, of_clusters, of_whole
 
 TISSUE_KINDS: Mapping[type[ErrorSource], str] = {
     Slide: "skin",
@@ -109,7 +108,7 @@ def _readings(tissue: Tissue) -> TissueReadings:
     whole, layout = parts_as_segments(tissue.body), Noise.unit(tissue.about)
     sources = sources_of(whole)
     kinds = np.repeat([TISSUE_KINDS[type(source)] for source in sources], [len(source.groups) for source in sources])
-    sd = np.concatenate([_sizes(whole, source) for source in sources])
+    sd = np.concatenate([_sizes(source, whole, tissue.body) for source in sources])
     rows, band = _rows(tissue, whole, layout)
     back, kind = [], []
     for one in dict.fromkeys(kinds.tolist()):
@@ -124,20 +123,13 @@ def _readings(tissue: Tissue) -> TissueReadings:
     return TissueReadings(whole, turn @ value, scales)
 
 
-def _sizes(body: Body, source: ErrorSource) -> Array:
-    """Return the standard deviations (K,) of a kind of errors; what the table has no size of is as that of the trunk,
-    whose parts these are.
+def _sizes(source: ErrorSource, whole: Body, body: Body) -> Array:
+    """Return the standard deviations (K,) of a kind of errors of the ``whole`` body, in which parts of the ``body`` are
+    segments: these sag as what they are parts of.
     """
-    try:
-        return deviations(body, (source,))
-    except UnknownName:
-        known = []
-        for group in source.groups:
-            try:
-                known.append(error_size(*group.split(" ", 1)))
-            except UnknownName:
-                known.append(error_size(group.partition(" ")[0], "trunk_head"))
-        return np.array(known)
+    if isinstance(source, Sag):
+        return np.array([error_size(*of_whole(group, body).split(" ")) for group in source.groups])
+    return deviations(whole, (source,))
 
 
 def _functionals(sources: tuple[ErrorSource, ...], trial: Response) -> Array:

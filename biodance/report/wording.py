@@ -89,8 +89,13 @@ def parted_gain(gain: dict[str, dict[str, Any] | None]) -> str:
         for share in (gain["mass"], gain["distribution"], gain["tissue"])
     )
     told = f"of the table's difference {mass} is the wrong mass, and of the rest {spread} how it is distributed"
+    if not gain["tissue"]:
+        return told
+    # what does not surely help explains nothing; without an interval (few blocks) the value counts
+    if (gain["tissue"]["ci95"] or [gain["tissue"]["value"]])[0] <= 0:
+        return f"{told}; what the fitted trials tell of skin, flesh and joints explains nothing of what is then left"
     moving = "skin, flesh and joints that move otherwise than the model, by what the fitted trials tell of them"
-    return f"{told}; of what is then left {tissue} {moving}" if tissue else told
+    return f"{told}; of what is then left {tissue} {moving}"
 
 
 def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:

@@ -372,6 +372,15 @@ def _of_table(quantity: str, target: str, joint: str) -> float:
         return error_size(quantity, "other")
 
 
+def of_whole(group: str, body: Body) -> str:
+    """Return a group of errors as that of the segment where it is one of a part: ``slide head`` -> ``slide
+    trunk_head``.
+    """
+    wholes = {kind_of(part.name): kind_of(body.segments[part.segment]) for part in body.parts}
+    quantity, _, target = group.partition(" ")
+    return f"{quantity} {wholes.get(target, target)}"
+
+
 CLUSTER_REACH = 0.1
 """m: lever that makes a turn of a marker cluster comparable with its translation."""
 
