@@ -90,7 +90,6 @@ ONE_ALGORITHM = {
     "virtual_lab/recording_faults.py": "faults of a recording: three builders and what each of them makes",
     "virtual_lab/movement/gait.py": "one stride on a belt: feet, forces, and the motion that they make, by repetition",
     "body/body.py": "the Body record, its Pinocchio model and its file: one list of fields",
-    "body/changes.py": "every way in which a body is cut, moved or written in other frames",
     "body/human/opinions.py": "what tape and scan say of the segments beside the table",
     "body/human/scaling.py": "from static markers to the whole body, the parts without markers included",
     "body/human/scan.py": "a closed surface, cut at the joints into segments",

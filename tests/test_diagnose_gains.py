@@ -11,6 +11,7 @@ from inferred_sessions import inferred
 
 from biodance.diagnosis.accept import case_fit
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
+from biodance.diagnosis.reasons import Reason
 from biodance.effects import NamedCause, effect
 from biodance.identification.identification import identify_body
 from biodance.inference.decision import Inferred
@@ -88,6 +89,20 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     assert wrong.gain is not None
     assert wrong.gain.ci95[1] < 0
     assert any(note.startswith("plate position plate1:x was taken back: accepting it") for note in told.notes)
+
+
+@pytest.mark.parametrize(("name", "target", "there"), [("trunk_joint", "", True), ("plate_gain", "Fz", False)])
+def test_kept_data_refute_a_fault_but_no_joint_that_markers_show(name: str, target: str, there: bool) -> None:
+    every = windows(1, trials=2)
+    found = inferred(body(), every, tolerances=known(), effects=("trunk_joint", "plate_gain"))
+    assert found.diagnosis.verdict == "nothing wrong"
+    kind = replace(effect(name), target=target)
+    size = np.array([0.1, 0.0][: len(kind.parameters)])
+    told = accused(found, NamedCause(kind, size, 1e-6 * np.eye(size.size))).refuted(0)
+    assert not told.named
+    assert ((name, target) in told.idle) is there
+    assert (Reason.CONTRADICTED in told.diagnosis.why) is not there
+    assert told.diagnosis.verdict == ("nothing wrong" if there else "unexplained")
 
 
 def test_a_touch_that_came_and_went_before_is_not_judged_by_trials_without_it(monkeypatch: pytest.MonkeyPatch) -> None:

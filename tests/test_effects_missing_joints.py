@@ -79,19 +79,32 @@ def test_body_with_the_joint_is_the_same_body_at_zero(name: str) -> None:
     assert (extended.com_boxes[:, 1] > extended.sip.com).all()
 
 
-@pytest.mark.parametrize("name", ["head_joint", "trunk_joint"])
-def test_the_parts_are_together_as_well_known_as_the_whole(name: str) -> None:
-    case = human_case(120)
+@pytest.mark.parametrize("name", KINDS)
+def test_the_parts_are_together_the_whole_whatever_it_weighs(name: str) -> None:
+    case, rng = human_case(120), np.random.default_rng(3)
     extended = KINDS[name](case)
     assert extended is not None
-    old, count = case.body.segment_index("trunk_head"), case.body.sip.phi.size
-    place = extended.joints[[joint.parent for joint in extended.joints].index(extended.segment_joint[old])].translation
-    together = np.eye(count, count + 10)
-    together[10 * old : 10 * old + 10, count:] = shift_matter(place)
-    np.testing.assert_allclose(together @ extended.sip.phi, case.body.sip.phi, atol=1e-9)
-    np.testing.assert_allclose(together @ extended.sip.covariance @ together.T, case.body.sip.covariance, atol=1e-9)
-    sd = np.sqrt(np.diag(extended.sip.covariance)[::10]) / extended.sip.mass
-    assert 0.05 < sd[-1] < 0.5
+    old, whole = (
+        case.body.segment_index("trunk_head"),
+        case.body.sip.phi * rng.uniform(0.8, 1.2, case.body.sip.phi.size),
+    )
+    links = extended.link_parameters(whole).reshape(-1, 10)
+    together = links[old].copy()
+    for k in range(len(case.body.segments), len(links)):
+        _, place = extended.place_on_segment(extended.segment_joint[k])
+        together += shift_matter(place) @ links[k]
+    np.testing.assert_allclose(together, whole.reshape(-1, 10)[old], atol=1e-9)
+
+
+def test_what_is_unlike_the_table_goes_along_with_the_thorax() -> None:
+    case = human_case(120)
+    extended = KINDS["trunk_joint"](case)
+    assert extended is not None
+    old, change = 10 * case.body.segment_index("trunk_head"), np.zeros(case.body.sip.phi.size)
+    change[old + 1] = 0.2  # kg m: matter of the trunk farther ahead, nothing heavier
+    links = extended.link_parameters(change).reshape(-1, 10)
+    np.testing.assert_allclose(links[-1][:4], [0.0, 0.2, 0.0, 0.0], atol=1e-12)
+    assert not np.delete(links, -1, axis=0).any()
 
 
 @pytest.mark.parametrize("name", KINDS)

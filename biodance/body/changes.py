@@ -1,5 +1,5 @@
-"""The same body with one thing elsewhere: a joint, a length, a marker, or a segment cut in two by another joint, the
-piece a segment of its own or a part of the whole.
+"""The same body with one thing elsewhere: a joint, a length, a marker, or a segment of which a part moves on a joint of
+its own.
 """
 
 from dataclasses import dataclass, field, replace
@@ -114,10 +114,8 @@ def neutral_turn(body: Body, joint: int) -> Array:
 
 _RANGE, _SPEED, _TORQUE = 1.2, 10.0, 100.0
 """rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
-_SPLIT = 0.2
-"""Relative standard deviation of the lighter part: what a cut leaves on which side (assumed; a vertebra up or down)."""
-_GRAM, _GYRATION = 1e-3, 0.03
-"""kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
+_GYRATION = 0.03
+"""m: radius of gyration of a part to which nothing is assigned."""
 _FLAT, _MOST = 1e-9, 0.95
 """Share of a pseudo-inertia's largest eigenvalue that counts as none, and of a whole that a part may take."""
 _TRACE = 1e-4
@@ -128,10 +126,9 @@ _TRACE = 1e-4
 class Cut:
     """Where ``segment`` is cut.
 
-    The new segment ``name`` turns about ``axes`` (name -> (3,) unit vector), one after the other, through ``place``
-    (3,) m; it takes the ten parameters ``phi`` (10,), the ``markers`` and the ``joints`` (indices of first axes) named.
-    All in the frame of the cut segment. A segment that takes no matter (``phi`` zero) is given a gram at ``place``, so
-    that it has a centre of mass.
+    The part ``name`` turns about ``axes`` (name -> (3,) unit vector), one after the other, through ``place`` (3,) m; it
+    takes the ten parameters ``phi`` (10,), the ``markers`` and the ``joints`` (indices of first axes) named. All in the
+    frame of the cut segment.
     """
 
     segment: str
@@ -143,38 +140,18 @@ class Cut:
     joints: tuple[int, ...] = field(default=())
 
 
-def branch_off(body: Body, cut: Cut) -> Body:
-    """Return the body with the cut's joint, at zero angle the same as before; the new segment keeps the frame of the
-    old one.
-
-    The new joints follow the segment's own in ``Body.joints``; the new segment is the last one.
-    """
-    if not cut.phi.any():
-        cut = replace(cut, phi=_GRAM * inertial_parameters(RigidInertia(1.0, cut.place, _GYRATION**2 * np.eye(3))))
-    old, new = body.segment_index(cut.segment), len(body.segments)
-    names = (*body.segments, cut.name)
-    return replace(
-        _jointed(_room_for(body, cut), cut, old, new),
-        segments=names,
-        sip=_sip(body, cut, names),
-        boxes=np.concatenate([body.boxes, body.boxes[[old]] - cut.place]),
-        com_boxes=_com_boxes(body, cut),
-        notes=(*body.notes, f"{cut.name} moves on {cut.segment}."),
-        at_joint=None,
-    )
-
-
-def with_part(body: Body, cut: Cut) -> Body:
+def with_part(body: Body, cut: Cut, *, rest_moves: bool = False) -> Body:
     """Return the body with the cut's joint, at zero angle the same as before; what is cut off is a `Part` of its
-    segment, the last one. A part that takes no matter takes a ten-thousandth.
+    segment, the last one. A part that takes no matter takes a ten-thousandth; where the ``rest_moves``, the parameters
+    of the cut are of what stays.
     """
-    segment, phi = body.segment_index(cut.segment), cut.phi
-    # In the part's own frame (origin at its joint), per kilogram of the whole.
-    share = shift_matter(-cut.place) @ phi / body.sip.phi[10 * segment]
-    if not phi.any():
+    segment = body.segment_index(cut.segment)
+    # Per kilogram of the whole; what moves in its own frame (origin at its joint).
+    share = (cut.phi if rest_moves else shift_matter(-cut.place) @ cut.phi) / body.sip.phi[10 * segment]
+    if not cut.phi.any():
         share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), _GYRATION**2 * np.eye(3)))
     jointed = _jointed(body, cut, segment, len(body.links))
-    return replace(jointed, parts=(*body.parts, Part(cut.name, segment, share)))
+    return replace(jointed, parts=(*body.parts, Part(cut.name, segment, share, rest_moves)))
 
 
 def with_axis(body: Body, after: str, name: str, axis: Array) -> Body:
@@ -207,7 +184,8 @@ def parts_as_segments(body: Body) -> Body:
             low, high = np.array(whole), np.array(whole)
             # Along the segment's y axis the joint's height divides the box between part and rest.
             low[1, 1] = high[0, 1] = np.clip(origin[1], *whole[:, 1])
-            own, boxes[part.segment] = (high, low) if part.share[2] > 0 else (low, high)
+            above = part.rest_moves or part.share[2] > 0
+            own, boxes[part.segment] = (high, low) if above else (low, high)
             own = own - origin
         boxes.append(own)
         rooms.append(own)
@@ -244,30 +222,6 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
     phi[rows[1]] = np.linalg.solve(moved, left)
 
 
-def _room_for(body: Body, cut: Cut) -> Body:
-    """Return the body with room for one more segment before its parts; parts on cut joints are its pieces."""
-    count, gone = len(body.segments), float(cut.phi[0] / body.sip.phi[10 * body.segment_index(cut.segment)])
-    parts = []
-    for k, part in enumerate(body.parts):
-        first = _first_joint(body, body.segment_joint[count + k])
-        moved = Part(part.name, count, part.share / gone)
-        # The share was per kilogram of the whole: its whole has now this share of the old mass.
-        stays = Part(part.name, part.segment, part.share / (1 - gone))
-        cut_here = body.segments[part.segment] == cut.segment
-        parts.append(moved if first in cut.joints else stays if cut_here else part)
-    joints = tuple(replace(j, segment=j.segment + (j.segment >= count)) for j in body.joints)
-    worn = tuple(s + (s >= count) for s in body.markers.segment)
-    return replace(body, parts=tuple(parts), joints=joints, markers=replace(body.markers, segment=worn))
-
-
-def _first_joint(body: Body, joint: int) -> int:
-    """Return the first joint of the chain from the segment that ``joint`` (an index) hangs on."""
-    above = body.joints[joint].parent
-    while above >= 0 and not 0 <= body.joints[above].segment < len(body.segments):
-        joint, above = above, body.joints[above].parent
-    return joint
-
-
 def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
     """Return the body with the cut's joints and limits, and its markers on the link ``new`` instead of ``old``."""
     first, count = body.segment_joint[old] + 1, len(cut.axes)
@@ -286,37 +240,6 @@ def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
     }
     joints = (*shifted[:first], *added, *shifted[first:])
     return replace(body, joints=joints, limits=JointLimits(**limits), markers=_markers(body, cut, new))
-
-
-def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
-    """Return the parameters of both parts."""
-    old = slice(10 * body.segment_index(cut.segment), 10 * body.segment_index(cut.segment) + 10)
-    whole, moved = body.sip.phi[old], shift_matter(-cut.place)
-    rest, part, split = whole - cut.phi, np.zeros((10, 10)), np.zeros(10)
-    if cut.phi[0] > _GRAM:
-        share = cut.phi[0] / whole[0]
-        # Splits in proportion to the mass, so that part @ whole = cut.phi at the table's whole.
-        part = share * np.eye(10) + np.outer(cut.phi - share * whole, np.eye(10)[0]) / whole[0]
-        split = _SPLIT * (cut.phi if cut.phi[0] < rest[0] else rest)
-    spread = np.eye(body.sip.phi.size + 10, body.sip.phi.size)
-    # Covariance of [rest, part] = [1 - part, part] times that of the whole.
-    spread[old, old], spread[-10:, old] = np.eye(10) - part, moved @ part
-    across = np.zeros(len(spread))
-    # What the cut itself leaves unsure goes from one side to the other: opposite signs.
-    across[old], across[-10:] = -split, moved @ split
-    phi = np.concatenate([body.sip.phi, moved @ cut.phi])
-    phi[old] = rest
-    return Sip(names, phi, spread @ body.sip.covariance @ spread.T + np.outer(across, across))
-
-
-def _com_boxes(body: Body, cut: Cut) -> Array:
-    """Return (N + 1, 2, 3) m: each part has the room of the whole about its own centre of mass."""
-    old = body.segment_index(cut.segment)
-    whole = body.sip.phi[10 * old : 10 * old + 10]
-    kept, gone = (part[1:4] / part[0] - whole[1:4] / whole[0] for part in (whole - cut.phi, cut.phi))
-    boxes = np.concatenate([body.com_boxes, body.com_boxes[[old]] + gone - cut.place])
-    boxes[old] += kept
-    return boxes
 
 
 def _markers(body: Body, cut: Cut, new: int) -> SegmentMarkers:

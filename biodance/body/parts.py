@@ -54,12 +54,14 @@ class Part:
     ``segment`` index of the segment that it is a piece of, whose inertial parameters go on meaning the whole, in the
     neutral posture; ``share`` (10,) the ten parameters of the piece, in its own frame (axes of the segment, origin at
     its joint), for one kilogram of the whole: the piece has its share of the mass, and whatever else of the whole
-    differs from the table is in the rest.
+    differs from the table is in the rest. Where the ``rest_moves``, the greater piece is the one that moves (a thorax
+    on the loins): ``share`` is then of what stays, in the segment's frame.
     """
 
     name: str
     segment: int
     share: Array
+    rest_moves: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, f"part {self.name}", share=(10,))
@@ -229,14 +231,27 @@ class JointTree:
             return None
         count = 10 * len(self.segments)
         table = np.eye(count + 10 * len(self.parts), count)
-        for k, part in enumerate(self.parts):
+        # Links = table times segments: the part has its share of the mass, and its matter is taken from the rest; a
+        # rest that moves goes where the part is, when all others are taken from it.
+        for k, part in sorted(enumerate(self.parts), key=lambda pair: pair[1].rest_moves):
             mass, rest = 10 * part.segment, slice(10 * part.segment, 10 * part.segment + 10)
-            # Links = table times segments: the part has its share of the mass, and its matter
-            # is taken from the rest.
-            table[count + 10 * k : count + 10 * k + 10, mass] = part.share
-            _, origin = self.place_on_segment(self.segment_joint[len(self.segments) + k])
-            table[rest, mass] -= shift_matter(origin) @ part.share
+            own, origin = self.part_place(k)
+            if part.rest_moves:
+                table[rest, mass] -= part.share
+                table[own] = shift_matter(-origin) @ table[rest]
+                table[rest] = 0.0
+                table[rest, mass] = part.share
+            else:
+                table[own, mass] = part.share
+                table[rest, mass] -= shift_matter(origin) @ part.share
         return table
+
+    def part_place(self, k: int) -> tuple[slice, Array]:
+        """Return where the parameters of part ``k`` stand among those of the `links`, and its joint's place (3,) m in
+        the frame of its segment.
+        """
+        link = len(self.segments) + k
+        return slice(10 * link, 10 * link + 10), self.place_on_segment(self.segment_joint[link])[1]
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint in ``joints``.

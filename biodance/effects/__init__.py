@@ -16,6 +16,7 @@ from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import UNLIKE, Care, ChannelEffect, Effect, NamedCause, Parameter, Transient
 from biodance.effects._base.installed_plate import InstalledPlate
+from biodance.effects._base.missing_joint import MissingJoint
 from biodance.effects._base.quality_check import (
     Checked,
     DiscreteEffect,
@@ -42,6 +43,7 @@ __all__ = [
     "DiscreteEffect",
     "Effect",
     "InstalledPlate",
+    "MissingJoint",
     "NamedCause",
     "Parameter",
     "QualityCheck",

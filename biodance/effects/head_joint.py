@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.changes import Cut, branch_off
+from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import neck_and_vertex, share_of_body
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
@@ -61,7 +61,7 @@ class HeadJoint(MissingJoint):
             return None
         neck, vertex = places
         head = share_of_body(body, "head", top=vertex, bottom=neck)
-        return branch_off(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
+        return with_part(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
 
 
 EFFECT = HeadJoint

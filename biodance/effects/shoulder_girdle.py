@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.changes import Cut, branch_off
+from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import shoulders, sternoclavicular
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
@@ -73,7 +73,7 @@ class ShoulderGirdle(MissingJoint):
                 f"{side}_clavicle_elevation": -sign * np.eye(3)[0],
                 f"{side}_clavicle_protraction": sign * np.eye(3)[1],
             }
-            body = branch_off(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
+            body = with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
         return doubting(body, SHOULDERS)
 
 

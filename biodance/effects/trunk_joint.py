@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.changes import Cut, branch_off
+from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import share_of_body, shoulders
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
@@ -81,9 +81,8 @@ class TrunkJoint(MissingJoint):
             return None
         place = _PLACE * middle
         loins = _PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
-        thorax = body.sip.phi[10 * index : 10 * index + 10] - loins
         arms = tuple(i for i, joint in enumerate(body.joints) if joint.parent == body.segment_joint[index])
-        extended = branch_off(body, Cut("trunk_head", "thorax", _AXES, place, thorax, on, arms))
+        extended = with_part(body, Cut("trunk_head", "thorax", _AXES, place, loins, on, arms), rest_moves=True)
         return doubting(extended, [name for name in body.markers.names if name.endswith(ELSEWHERE)])
 
 

@@ -160,18 +160,17 @@ def share_errors(body: Body) -> Array:
 
     Without them a part that moves would weigh its whole: what a nodding head shows, over the table's share of it.
     """
-    table, count, columns = body.sharing, len(body.segments), []
+    table, columns = body.sharing, []
     if table is None:
-        return np.zeros((10 * count, 0))
+        return np.zeros((10 * len(body.segments), 0))
     phi = table @ body.sip.phi
     for k, part in enumerate(body.parts):
-        own = slice(10 * (count + k), 10 * (count + k + 1))
-        rest = slice(10 * part.segment, 10 * (part.segment + 1))
-        _, origin = body.place_on_segment(body.segment_joint[count + k])
-        for error in _part_errors(part.name, phi[own]).T:
+        (own, origin), rest = body.part_place(k), slice(10 * part.segment, 10 * (part.segment + 1))
+        shared, other, way = (rest, own, -origin) if part.rest_moves else (own, rest, origin)
+        for error in _part_errors(part.name, phi[shared]).T:
             column = np.zeros(len(phi))
-            # The rest of the segment loses what the part gains, seen from the segment's origin.
-            column[own], column[rest] = error, -shift_matter(origin) @ error
+            # The other piece of the segment loses what this one gains, seen from its own origin.
+            column[shared], column[other] = error, -shift_matter(way) @ error
             columns.append(column)
     return np.array(columns).T
 

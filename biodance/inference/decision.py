@@ -21,7 +21,7 @@ from biodance.diagnosis.consequence import NAMED, SUGGESTED, Adequacy, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
-from biodance.effects import ChannelEffect, InstalledPlate, NamedCause, unit_at
+from biodance.effects import ChannelEffect, InstalledPlate, MissingJoint, NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
@@ -81,7 +81,8 @@ class Place:
 @dataclass(frozen=True, eq=False)
 class Inferred:
     """A diagnosis with the posterior that it was decided from: ``named`` the causes of its findings, in their order;
-    ``bare`` the diagnosis before any judgement of causes.
+    ``bare`` the diagnosis before any judgement of causes; ``idle`` the causes that are there, and mending them helps
+    nothing.
     """
 
     diagnosis: Diagnosis
@@ -89,6 +90,7 @@ class Inferred:
     posterior: Posterior
     bare: Diagnosis
     named: tuple[NamedCause, ...] = ()
+    idle: frozenset[Key] = frozenset()
 
     @property
     def best(self) -> Hypothesis:
@@ -113,12 +115,17 @@ class Inferred:
         return replace(self, diagnosis=told, named=(*fitted, *(one for one in rest if one.course)))
 
     def refuted(self, index: int) -> "Inferred":
-        """Return what the session ends with given that the cause of finding ``index`` is not there, because data that
-        were not used contradict it: another cause may stand in its place; where none does, nobody can tell.
+        """Return what the session ends with where accepting finding ``index`` makes data worse that were not used: the
+        cause is not there, and another may stand in its place; where none does, nobody can tell.
+
+        A missing joint that markers show is there, but what it does to the forces is known to a half (`Effect.unlike`):
+        the simulation is better off without it, as it is without the small one that everybody has.
         """
-        gone = self.diagnosis.findings[index]
-        bare = replace(self.bare, resembles=(*self.bare.resembles, gone), notes=self.diagnosis.notes)
-        found = decide(self.search, self.posterior.lacking((gone.effect, gone.target)), bare)
+        gone, bare = self.diagnosis.findings[index], replace(self.bare, notes=self.diagnosis.notes)
+        if isinstance(self.named[index].effect, MissingJoint):
+            return decide(self.search, self.posterior, bare, self.idle | {(gone.effect, gone.target)})
+        bare = replace(bare, resembles=(*bare.resembles, gone))
+        found = decide(self.search, self.posterior.lacking((gone.effect, gone.target)), bare, self.idle)
         told = found.diagnosis
         if not found.named:
             told = replace(told, explained=False, why={**self.diagnosis.why, **told.why, Reason.CONTRADICTED: ()})
@@ -215,17 +222,19 @@ def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> Named
 _Told = tuple[Place, Finding]
 
 
-def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
-    """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes."""
+def decide(search: Search, posterior: Posterior, bare: Diagnosis, idle: frozenset[Key] = frozenset()) -> Inferred:
+    """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes, ``idle`` causes that are
+    no fault although they are there.
+    """
     rows, best = search.rows, posterior.best
     every = places(posterior, search.prior)
     likely = [(place, _finding(place, rows, best)) for place in every if place.probability >= SUGGESTED]
-    large = [one for one in likely if _is_large(rows, one[0].cause)]
+    large = [one for one in likely if one[0].cause.names not in idle and _is_large(rows, one[0].cause)]
     sure = [one for one in large if one[0].probability >= NAMED]
     named = [one for one in sure if not _is_forbidden(rows, one[0].cause)]
     resembled = [one for one in large if one not in named]
     left = adequacy(posterior.unexplained, rows)
-    p_clean, reasons = _ends(posterior, rows, left, sure=bool(sure), forbidden=len(named) < len(sure))
+    p_clean, reasons = _ends(posterior, rows, left, idle, sure=bool(sure), forbidden=len(named) < len(sure))
     findings = _with_look_alikes(named, best, rows)
     told = replace(
         bare,
@@ -239,18 +248,24 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
         p_clean=p_clean,
         p_unknown=posterior.unknown,
     )
-    return Inferred(told, search, posterior, bare, tuple(place.cause for place, _ in named))
+    return Inferred(told, search, posterior, bare, tuple(place.cause for place, _ in named), idle)
 
 
 def _ends(
-    posterior: Posterior, rows: Rows, left: tuple[Adequacy, ...], *, sure: bool, forbidden: bool
+    posterior: Posterior,
+    rows: Rows,
+    left: tuple[Adequacy, ...],
+    idle: frozenset[Key],
+    *,
+    sure: bool,
+    forbidden: bool,
 ) -> tuple[float, dict[Reason, bool]]:
     """Return the probability that nothing is there that matters, and which reasons hold to say no more; ``left`` what
     is left of the forces, whether any cause is ``sure``, and one of them ``forbidden``.
     """
     left_matters = any(row.matters for row in left)
     p_clean, unknown = (
-        well(rows, posterior, unknown_matters=left_matters),
+        well(rows, posterior, idle, unknown_matters=left_matters),
         posterior.unknown >= UNKNOWN and left_matters,
     )
     return p_clean, {
@@ -278,25 +293,25 @@ def _why(
     return {**found, **{reason: () for reason, holds in reasons.items() if holds}}
 
 
-def well(rows: Rows, posterior: Posterior, *, unknown_matters: bool) -> float:
+def well(rows: Rows, posterior: Posterior, idle: frozenset[Key] = frozenset(), *, unknown_matters: bool) -> float:
     """Return the probability that nothing is there that matters: of all sets none of whose causes is large, without an
     unknown cause, or beside one where what is left is too small to matter.
     """
-    own = float(posterior.weights[_without_large(rows, posterior), 0].sum())
+    own = float(posterior.weights[_without_large(rows, posterior, idle), 0].sum())
     if unknown_matters:
         return own
     if posterior.louder is None:
-        return own + float(posterior.weights[_without_large(rows, posterior), 1].sum())
+        return own + float(posterior.weights[_without_large(rows, posterior, idle), 1].sum())
     loud = posterior.louder
     # The sets of the louder posterior already know of the unknown: they share its probability.
-    return own + posterior.unknown * float(loud.weights[_without_large(rows, loud)].sum())
+    return own + posterior.unknown * float(loud.weights[_without_large(rows, loud, idle)].sum())
 
 
-def _without_large(rows: Rows, posterior: Posterior) -> NDArray[np.bool_]:
+def _without_large(rows: Rows, posterior: Posterior, idle: frozenset[Key]) -> NDArray[np.bool_]:
     """Return (H,) which sets hold no cause that is large; of those too improbable to count, none."""
     return np.array(
         [
-            weight > _COUNTED and not any(_is_large(rows, cause) for cause in one.causes)
+            weight > _COUNTED and not any(cause.names not in idle and _is_large(rows, cause) for cause in one.causes)
             for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
         ]
     )

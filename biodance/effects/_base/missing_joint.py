@@ -99,11 +99,10 @@ class MissingJoint(Effect, ABC):
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked with the body that has the joint."""
         body = self.extended_body(case)
-        return (
-            case
-            if body is None
-            else replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
-        )
+        if body is None:
+            return case
+        body = replace(body, markers=replace(body.markers, weight=case.body.markers.weight))
+        return replace(case, body=body, motion=track(body, case.trial))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +124,8 @@ class Movement:
 
     def wrench(self, case: Case) -> Array:
         """Return (F, 6) about the lab origin: what the joint's motion adds with the parameters in use."""
-        with_joint = wrench_of_segments(self.body, self.loose, _parameters(case, self.body))
-        return with_joint - wrench_of_segments(case.body, self.stiff, case.phi)
+        with_joint, without = ((self.body, self.loose), (case.body, self.stiff))
+        return wrench_of_segments(*with_joint, case.phi) - wrench_of_segments(*without, case.phi)
 
 
 def _movement(case: Case, effect: MissingJoint) -> Movement | None:
@@ -222,14 +221,6 @@ def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
         segment, places.position[columns]
     )
     return np.asarray(np.einsum("tkij,tki->kj", before.rotation[:, segment], step) / len(step))
-
-
-def _parameters(case: Case, body: Body) -> Array:
-    """Return the parameters in use of the body with more segments: what was cut off keeps the table's."""
-    phi = np.array(body.sip.phi)
-    # Identified changes act on the old segments; what was cut off keeps the table's values.
-    phi[: case.phi.size] += case.phi - case.body.sip.phi
-    return phi
 
 
 def doubting(body: Body, names: Iterable[str]) -> Body:
