@@ -3,8 +3,7 @@
     BIODANCE_DATA=folder python -m benchmarks walks [--without-static] [--only SESSION ...]
 
 The folder holds the public sessions named below: C3D files, and TRC with OpenSim's force files. One fault at a time is
-in every file of a copy, as in a laboratory; ``--without-static`` with static trials taken away. A copy takes some ten
-seconds.
+in every file of a copy, as in a laboratory; ``--without-static`` with static trials taken away.
 """
 
 import argparse
@@ -35,8 +34,7 @@ CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
 SESSIONS = (*CHILDREN, "adl_gait", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "pycgm",
             "c3d_parser_Sydney", "c3d_parser_QCMAS", "opensim_models/raj_walk", "opensim_models/raj_run",
             "opensim_models/gait10", "subject4")  # fmt: skip
-NOT_WALKED = ("DJ", "STS", "squats")
-"""Beginnings of the names of files that hold no walk."""
+NOT_WALKED = ("DJ", "STS", "squats")  # beginnings of the names of files that hold no walk
 
 
 @dataclass(frozen=True)
@@ -52,8 +50,7 @@ class Fault:
 @dataclass(frozen=True)
 class Score:
     """One session with one fault: whether it was named first, named or in a set, covered (None: no interval), all that
-    was named; ``others`` of which the fault is no look-alike; ``verdict`` of the whole diagnosis; ``claims`` by name
-    how probable each was said to be.
+    was named; ``others`` of which it is no look-alike; ``claims`` how probable each; ``limit`` of what is shown.
     """
 
     session: str
@@ -65,6 +62,7 @@ class Score:
     others: tuple[tuple[str, str], ...] = ()
     verdict: str = ""
     claims: tuple[tuple[tuple[str, str], float], ...] = ()
+    limit: float = np.nan
 
 
 def faults_for(session: Session) -> Iterator[Fault]:
@@ -97,9 +95,8 @@ def faults_for(session: Session) -> Iterator[Fault]:
 
 def _empty(seen: list[SeenTrial], plate: str, channel: str) -> float:
     """Return what a plate reads empty in the recordings as they are, N, mean of the trials: 0 where none shows it."""
-    kept = [
-        o.value for one in seen for o in observe(one, ("empty_plate",)) if o.what == f"{plate} {channel}, taken off"
-    ]
+    what, every = f"{plate} {channel}, taken off", (observe(one, ("empty_plate",)) for one in seen)
+    kept = [o.value for some in every for o in some if o.what == what]
     return float(np.mean(kept)) if kept else 0.0
 
 
@@ -206,21 +203,22 @@ def scored(data: Path, name: str, place: Path, *, static: bool = True) -> Iterat
         still = {trial.source.path.name for trial in clean.trials if trial.role == "static"}
         files = [one for one in files if one.name not in still]
         clean = read_session(copied(files, place / name / "moving", ""))
+    limits: dict[tuple[str, str], float] = {}
     for number, fault in enumerate([Fault("nothing", "", ()), *faults_for(clean)]):
         try:
             session = read_session(copied(files, place / name / str(number), fault.text)) if fault.text else clean
             found = diagnose_session(examine(session)).diagnosis
-            yield replace(judged(name, fault, found.findings), verdict=f"{found.verdict}: ")
+            limits = limits or {(row.effect, row.target): row.limit for row in found.limits}
+            limit = min((limits.get(truth, np.nan) for truth in fault.truths[:1]), default=np.nan)
+            yield replace(judged(name, fault, found.findings), verdict=f"{found.verdict}: ", limit=limit)
         except BiodanceError as error:
             yield Score(name, fault, False, False, None, f"refused: {error}")
 
 
 def table(scores: list[Score]) -> list[str]:
     """Return the summary as a table: one line a fault."""
-    lines = [
-        "| written | sessions | named first | first or in the set | interval covers | innocents |",
-        "|---" * 6 + "|",
-    ]
+    head = "| written | sessions | named first | first or in the set | interval covers | innocents |"
+    lines = [head, "|---" * 6 + "|"]
     every, clean = [one for one in scores if one.fault.text], [one for one in scores if not one.fault.text]
     known = {(one.session, name) for one in clean for name in one.others}
     for kind in (*dict.fromkeys(one.fault.kind for one in every), "all"):
@@ -230,6 +228,9 @@ def table(scores: list[Score]) -> list[str]:
         first, listed = sum(one.first for one in some), sum(one.listed for one in some)
         blamed = sum(any((one.session, name) not in known for name in one.others) for one in some)
         lines.append(f"| {kind} | {len(some)} | {first} | {listed} | {covers} | {blamed} |")
+    missed = [one for one in every if not one.listed]
+    small = sum(abs(one.fault.size) < one.limit for one in missed)
+    lines.append(f"| missed: smaller than that session says that it shows | {len(missed)} | {small} | | | |")
     lines.append(f"| nothing | {len(clean)} | names in {sum(bool(one.told) for one in clean)} | | | |")
     new = [(p, name not in one.others) for one in every for name, p in one.claims if (one.session, name) not in known]
     for low, high in pairwise((0.5, 0.85, 0.95, 1.0)):
