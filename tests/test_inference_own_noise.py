@@ -2,21 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from inferred_rows import DrawnRows, rows
 
 from biodance.diagnosis.own_tolerances import own_tolerances
+from biodance.diagnosis.spectrum import power_about, spectrum
 from biodance.effects import causes
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.own_noise import _shown, own_noise
+from biodance.inference.own_noise import _left, _shown, own_noise
 from biodance.inference.rows import rows_of
 from biodance.inference.scales import LOUD, fit, nominal, prior_sd, products
 from biodance.inference.session import see
 from biodance.pipeline.judged_trials import chosen_windows
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
+from biodance.settings import USUAL
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -42,7 +46,7 @@ def drawn(size: np.ndarray, *, each: int, seed: int = 3) -> DrawnRows:
 def shown(found: DrawnRows) -> np.ndarray:
     """Return (Q,) the standard deviation of every whitened row under the session's own noise."""
     white = np.linalg.inv(np.linalg.cholesky(EXPECTED))
-    own = white @ own_noise(found).noise @ white.T
+    own = white @ own_noise(found)[0].noise @ white.T
     np.testing.assert_allclose(own, own * np.eye(6), atol=1e-12)
     return np.sqrt(np.einsum("bcc->bc", own)).ravel()
 
@@ -102,7 +106,7 @@ def test_real_walks_are_quieter_than_their_movement_and_markers_let_expect(
     windows, known = chosen_windows(result.trials), causes()
     own = own_tolerances(result.body, windows, result.session.trials).tolerances
     seen = see(result.body, windows, own, known, None)
-    found = own_noise(rows_of(seen.problem, seen.causes, own, None)).noise
+    found = own_noise(rows_of(seen.problem, seen.causes, own, None))[0].noise
     white = np.linalg.inv(np.linalg.cholesky(own.noise))
     share = np.sqrt(np.einsum("bcc->bc", white @ found @ white.swapaxes(1, 2)))
     assert np.median(share) < 0.9  # the shortest walk has 108 rows, which say little of 30 sizes
@@ -126,4 +130,36 @@ def test_columns_take_degrees_of_freedom_at_the_noise_of_the_session() -> None:
         at = np.flatnonzero(some.block == q)
         free = at.size - np.trace(fitted[np.ix_(at, at)])
         raw = 0.5 * np.log(left[at] @ left[at] / free) * 2 * free / (2 * free + 1 / LOUD**2)
-        assert _shown(some, columns, one, quiet)[q] == pytest.approx(np.clip(np.exp(raw), 0.5, 1.0), rel=1e-6)
+        assert _shown(some, one, quiet, *_left(some, columns, one))[q] == pytest.approx(
+            np.clip(np.exp(raw), 0.5, 1.0), rel=1e-6
+        )
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.8])
+def test_the_share_of_the_noise_that_goes_with_the_movement_is_found(share: float) -> None:
+    """Noise is drawn where a movement that repeats has its power: in every eighth coefficient."""
+    found = drawn(np.ones(BLOCKS), each=48)
+    count = found.plates // len(CHANNELS)
+    power = np.where(np.arange(count) % 8 == 0, 4.5, 0.5)
+    own = found.block[: found.plates].reshape(-1, len(CHANNELS))
+    assert (own // len(CHANNELS) == own[:, :1] // len(CHANNELS)).all(), "six channels of one band in every row"
+    y = np.array(found.y)
+    y[: found.plates] *= np.repeat(np.sqrt(1 - share + share * power), len(CHANNELS))
+    assert own_noise(replace(found, y=y), power)[1] == pytest.approx(share, abs=0.15)
+
+
+def test_power_lies_where_a_movement_repeats() -> None:
+    """A force of 1.5 Hz in 20 s has its power about coefficient 60, and every band has one on average."""
+    time = np.arange(0.0, 20.0, 0.04)
+    rng = np.random.default_rng(5)
+    wrench = np.outer(np.sin(2 * np.pi * 1.5 * time + 0.4), [10.0, 5, 40, 3, 2, 1]) + rng.normal(0, 0.1, (500, 6))
+    case: Any = SimpleNamespace(
+        motion=SimpleNamespace(rate=25.0), trial=SimpleNamespace(name="t", settings=USUAL), predicted=wrench
+    )
+    where = spectrum((case,), (np.ones(500, bool),), np.zeros(3))
+    power = power_about(where, (case,), np.tile(np.eye(6), (len(BANDS), 1, 1)))
+    for b in range(len(BANDS)):
+        assert power[where.band == b].mean() == pytest.approx(1.0)
+    own = np.flatnonzero(where.band == BANDS.of(500)[60])
+    assert abs(int(np.argmax(power)) - 60) <= 1
+    assert power[60 - 4 : 60 + 5].sum() > 0.9 * power[own].sum()

@@ -42,11 +42,8 @@ class Model:
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
     """Return ``rows`` (r, n) of the problem in units of their standard deviation, in ``out`` or a new array."""
-    return whitened(rows, problem.spectrum.band, marker_keys(problem), _body_mass(problem), tolerances, out=out)
-
-
-def _body_mass(problem: Problem) -> float:
-    return float(problem.cases[0].body.sip.mass.sum())
+    where, mass = problem.spectrum, float(problem.cases[0].body.sip.mass.sum())
+    return whitened(rows, where.band, marker_keys(problem), mass, tolerances, loud=where.loud, out=out)
 
 
 def marker_keys(problem: Problem) -> tuple[str, ...]:

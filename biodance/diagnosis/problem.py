@@ -173,6 +173,10 @@ class Problem:
         """
         return replace(self, cases=tuple(case.with_parameters(phi) for case in self.cases))
 
+    def with_loud(self, loud: Array) -> "Problem":
+        """Return the problem whose rows of the plates are ``loud`` (m,) times as loud as their bands."""
+        return replace(self, spectrum=replace(self.spectrum, loud=loud))
+
     def with_matter(self, phi: Array) -> "Problem":
         """Return the problem whose kinematic errors move the matter of ``phi`` (10N,): what is heavier than the
         table errs more.

@@ -31,7 +31,7 @@ class Spectrum:
 
     ``layout`` bands and the point (3,) m about which moments are taken; ``picks`` per trial the runs of frames
     (indices); ``rates`` and ``cutoffs`` Hz per trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs
-    together.
+    together; ``loud`` (m,) how many times as loud as its band is each row expected to be.
     """
 
     layout: Noise
@@ -41,6 +41,7 @@ class Spectrum:
     band: NDArray[np.intp]
     trial: NDArray[np.intp]
     seconds: float
+    loud: Array
 
     def bands(self, index: int) -> Bands:
         """Return the bands of one trial, as far as its low-pass leaves them."""
@@ -79,6 +80,27 @@ def needed(cases: tuple[Case, ...], where: Spectrum) -> Array:
     return np.stack(square, axis=1) / np.maximum(np.bincount(where.band, minlength=len(BANDS)), 1)[:, None]
 
 
+_ABOUT = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
+"""Weights of neighbouring coefficients: a cosine of any phase and frequency lies in some of them."""
+
+
+def power_about(where: Spectrum, cases: tuple[Case, ...], whiteners: Array) -> Array:
+    """Return (m,): power of the wrench that the movement of ``cases`` needs about every row, mean of the channels in
+    units of their noise (``whiteners`` (B, 6, 6) of each band), over its mean in the band; 1 where the band is that of
+    means, or nothing is needed.
+    """
+    rows = where.rows(case.predicted[:, :, None] for case in cases)[:, :, 0]
+    power = np.mean(np.einsum("mij,mj->mi", whiteners[where.band], rows) ** 2, axis=1)
+    # A run begins where the frequency falls or another trial begins.
+    first = np.flatnonzero((np.diff(where.band, prepend=len(BANDS)) < 0) | (np.diff(where.trial, prepend=-1) != 0))
+    for run in np.split(np.arange(power.size), first[1:]):
+        around = [np.convolve(some, _ABOUT, "same") for some in (power[run], np.ones(run.size))]
+        power[run] = around[0][: run.size] / around[1][: run.size]
+    mean = np.bincount(where.band, power, len(BANDS)) / np.maximum(np.bincount(where.band, minlength=len(BANDS)), 1)
+    there = (where.band > 0) & (mean[where.band] > 0)
+    return np.where(there, power / np.where(there, mean[where.band], 1.0), 1.0)
+
+
 def spectrum(
     cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about: Array, *, shortest: float = SHORTEST_RUN
 ) -> Spectrum:
@@ -108,7 +130,7 @@ def spectrum(
             f"No trial of {names} has {shortest:g} s of fully measured ground contact, so there is nothing to diagnose."
         )
     where = np.concatenate(band), np.concatenate(trial)
-    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, cutoffs, *where, seconds)
+    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, cutoffs, *where, seconds, np.ones(where[0].size))
 
 
 def _bands(rate: float, cutoff: float) -> Bands:

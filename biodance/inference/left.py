@@ -57,10 +57,10 @@ def _newtons(rows: Rows, left: Array) -> Array:
     """Return (m, 6) N, N·m: whitened rows of the plates as they were before."""
     assert rows.problem is not None
     mass = float(rows.problem.cases[0].body.sip.mass.sum())
-    # Whitened = W y per band, so y = W^-1 (whitened).
-    coloured = np.linalg.inv(rows.tolerances.whiteners(mass))
+    # Whitened = W y / loud per band, so y = W^-1 (whitened) loud.
+    coloured, where = np.linalg.inv(rows.tolerances.whiteners(mass)), rows.problem.spectrum
     # [m, i] = sum_j W^-1[band(m), i, j] left[m, j].
-    return np.asarray(np.einsum("mij,mj->mi", coloured[rows.problem.spectrum.band], left))
+    return np.asarray(np.einsum("mij,mj->mi", coloured[where.band], left * where.loud[:, None]))
 
 
 def _second(problem: Problem, left: Array, row: Adequacy) -> float:

@@ -21,16 +21,20 @@ from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
 _ROUNDS, _NEAR = 10, 0.03
+_SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+_LEAST_FREE = 0.05
+"""Share of its variance that is left of a row at least."""
 _QUIETEST = 0.5
 """Share of the expected noise below which none is believed: beside less, what is no fault has to be larger than it was
 learned to be (flesh that sags, 4.6 times in simulated postures). At 0.2 real sessions give the same names.
 """
 
 
-def own_noise(rows: Rows) -> Tolerances:
+def own_noise(rows: Rows, power: Array | None = None) -> tuple[Tolerances, float]:
     """Return the tolerances of ``rows`` with the noise that the session shows in every band and channel, in the
     channels in which they are whitened: at most as expected, its logarithm shrunk towards that by its prior
-    ~ N(0, `LOUD`^2).
+    ~ N(0, `LOUD`^2); and which share of it goes within its band with the ``power`` (m,) of the coefficients
+    (`power_about`).
     """
     columns, scales, sd = VisibleColumns.of(rows), nominal(rows), prior_sd(rows)
     none, quiet = np.empty((len(rows.y), 0)), np.ones(rows.noises + 1)
@@ -39,22 +43,48 @@ def own_noise(rows: Rows) -> Tolerances:
         found = fit(products(columns, none, rows.y, 1 / quiet), sd, scales)
         before, scales = quiet, found.scales
         usual = posterior(found.products, sd, replace(as_anywhere(scales, rows), members=scales.members))
-        quiet = _shown(rows, columns, usual, before)
+        left = _left(rows, columns, usual)
+        quiet = _shown(rows, usual, before, *left)
         if np.abs(np.log(quiet / before)).max() < _NEAR:
             break
     share = quiet[: len(BANDS) * len(CHANNELS)].reshape(len(BANDS), 1, len(CHANNELS))
     # Columns of the Cholesky factor times the shares: L diag(share)^2 L'.
     root = np.linalg.cholesky(rows.tolerances.noise) * share
-    return replace(rows.tolerances, noise=root @ root.swapaxes(1, 2))
+    moving = 0.0 if power is None else _moving(rows, np.repeat(power, len(CHANNELS)), usual, before, *left)
+    return replace(rows.tolerances, noise=root @ root.swapaxes(1, 2)), moving
 
 
-def _shown(rows: Rows, columns: VisibleColumns, found: ScaledFit, quiet: Array) -> Array:
-    """Return (Q + 1,) the noise of each band and channel over what is expected, from the posterior at ``quiet``."""
-    n = rows.plates
-    X = columns.X[:n] * found.size
-    # Leverage of each row, x' C x = |L^-1 x|^2 with A = L L': no inverse of A.
+def _left(rows: Rows, columns: VisibleColumns, found: ScaledFit) -> tuple[Array, Array]:
+    """Return (n,) what the posterior mean leaves of the plates' rows, and the leverage of each at unit noise."""
+    X = columns.X[: rows.plates] * found.size
+    # x' C x = |L^-1 x|^2 with A = L L': no inverse of A.
     taken = np.sum(solve_triangular(found.lower, X.T, lower=True, check_finite=False) ** 2, axis=0)
-    left = rows.y[:n] - X @ found.u
+    return rows.y[: rows.plates] - X @ found.u, taken
+
+
+def _moving(rows: Rows, power: Array, found: ScaledFit, quiet: Array, left: Array, taken: Array) -> float:
+    """Return the share of the noise that goes with ``power`` (n,), the most probable of `_SHARES`: what is ``left``
+    (n,) has the variance s_q^2 (1 - share + share power), and each s_q is free.
+    """
+    block = rows.block[: rows.plates]
+    # E[e^2] = s^2 (1 - h): rows that columns have taken tell less than they seem to.
+    free = 1 - taken * np.exp(-2 * found.scales.noise) / quiet[block] ** 2
+    square, count = left**2 / np.maximum(free, _LEAST_FREE), np.bincount(block)
+    there = count > 0
+
+    def log_density(share: float) -> float:
+        variance = 1 - share + share * power
+        level = np.bincount(block, square / variance)[there] / count[there]
+        return -0.5 * float(count[there] @ np.log(np.maximum(level, 1e-12)) + np.log(variance).sum())
+
+    return max(_SHARES, key=log_density)
+
+
+def _shown(rows: Rows, found: ScaledFit, quiet: Array, left: Array, taken: Array) -> Array:
+    """Return (Q + 1,) the noise of each band and channel over what is expected, from the posterior at ``quiet`` and
+    what it leaves (`_left`).
+    """
+    n = rows.plates
     count, square, took = (np.bincount(rows.block[:n], weight, len(quiet)) for weight in (np.ones(n), left**2, taken))
     # Degrees of freedom taken at the noise of this round: rows weigh exp(-2 noise) / quiet^2.
     free = count - took * np.exp(-2 * found.scales.noise) / quiet**2

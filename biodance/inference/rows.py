@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.diagnosis.candidates import Candidate, removed, slopes
-from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
+from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out, white
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Care, Case, Effect, effects
 from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.tolerances import Tolerances, between_laboratories, key_of, whitened
+from biodance.uncertainty.tolerances import Tolerances, between_laboratories, key_of
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
@@ -96,8 +96,7 @@ class Rows:
         """Return ``rows`` (r', n) of plates and markers in units of their nominal standard deviation."""
         if self.problem is None:
             return rows
-        band = self.problem.spectrum.band
-        return whitened(rows, band, marker_keys(self.problem), _mass(self.problem), self.tolerances)
+        return white(self.problem, self.tolerances, rows)
 
     def mean_square(self, rows: Array) -> Array:
         """Return (Q + 1,) the mean square of ``rows`` (r,) in each band and channel of the plates; zero in markers and
@@ -247,7 +246,7 @@ def _simulated(
     columns *= sizes
     # Body's columns, tolerances and target are whitened in one pass over the rows.
     both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
-    both = whitened(both, problem.spectrum.band, keys, _mass(problem), tolerances, out=both)
+    both = white(problem, tolerances, both, out=both)
     first = problem.sip.shape[1]
     units = {
         name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
@@ -300,7 +299,3 @@ def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:
     plates = (6 * problem.spectrum.band[:, None] + np.arange(6)).ravel()
     markers = np.full(len(problem.target) - plates.size, 6 * len(BANDS))
     return np.concatenate([plates, markers, np.full(count - len(problem.target), -1)])
-
-
-def _mass(problem: Problem) -> float:
-    return float(problem.cases[0].body.sip.mass.sum())

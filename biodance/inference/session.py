@@ -14,6 +14,7 @@ from biodance.diagnosis.model import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
+from biodance.diagnosis.spectrum import power_about
 from biodance.diagnosis.witness_evidence import CONTACTS, ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.columns import VisibleColumns
@@ -83,7 +84,7 @@ def judge(
     """
     if seen is not None and simulate and not seen.standing:
         every = with_observed(seen.causes, evidence, asked, seen.problem)
-        known = own_noise(rows_of(seen.problem, every, known, evidence))
+        seen, known = _with_own_noise(seen, every, known, evidence)
         rows = rows_of(seen.problem, every, known, evidence)
     else:
         every = with_observed((), evidence, asked, of=seen.problem.cases[0] if seen else None)
@@ -99,6 +100,21 @@ def judge(
         told = replace(found.diagnosis, findings=sign, explained=False)
         found = replace(found, diagnosis=told, named=())
     return found if rows.problem is not None else replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
+
+
+def _with_own_noise(
+    seen: Seen, every: tuple[Candidate, ...], known: Tolerances, evidence: ObservedEvidence
+) -> tuple[Seen, Tolerances]:
+    """Return what was seen with the noise where the session's movement has it, and the tolerances with its own noise
+    (`own_noise`).
+    """
+    posed = seen.problem
+    power = power_about(posed.spectrum, posed.cases, known.whiteners(float(posed.cases[0].body.sip.mass.sum())))
+    quiet, share = own_noise(rows_of(posed, every, known, evidence), power)
+    if not share:
+        return seen, quiet
+    seen = replace(seen, problem=posed.with_loud(np.sqrt(1 - share + share * power)))
+    return seen, own_noise(rows_of(seen.problem, every, known, evidence))[0]
 
 
 def _inferred(

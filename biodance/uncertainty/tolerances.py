@@ -272,10 +272,12 @@ def whitened(
     mass: float,
     tolerances: Tolerances,
     *,
+    loud: Array | None = None,
     out: Array | None = None,
 ) -> Array:
-    """Return ``rows`` (r, n) in units of their standard deviation, written into ``out`` (contiguous; may be ``rows``
-    itself: they are the largest arrays of a diagnosis) or a new array.
+    """Return ``rows`` (r, n) in units of their standard deviation, those of the plates ``loud`` (m,) times that of
+    their band, written into ``out`` (contiguous; may be ``rows`` itself: they are the largest arrays of a diagnosis) or
+    a new array.
     """
     count = 6 * band.size
     out = np.empty(rows.shape, rows.dtype) if out is None else out
@@ -285,6 +287,8 @@ def whitened(
         here = np.flatnonzero(band == b)
         for some in (here[start : start + _PIECE] for start in range(0, here.size, _PIECE)):
             white[some] = matrix @ wrench[some]
+    if loud is not None:
+        white /= loud[:, None, None].astype(rows.dtype)
     known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
     # A marker without a known size has infinite variance: its rows become zero and tell nothing.
     sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
