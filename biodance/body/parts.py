@@ -247,8 +247,23 @@ class JointTree:
         return table
 
     def part_place(self, k: int) -> tuple[slice, Array]:
-        """Return where the parameters of part ``k`` stand among those of the `links`, and its joint's place (3,) m in
-        the frame of its segment.
+        """Return where a part stands.
+
+        Parameters
+        ----------
+        k : int
+            Index in ``parts``.
+
+        Returns
+        -------
+        tuple
+            Slice of its ten parameters among those of the ``links``, and the place (3,) m of its joint in the frame of
+            its segment.
+
+        Examples
+        --------
+        >>> [result.body.part_place(k) for k in range(len(result.body.parts))]
+        []
         """
         link = len(self.segments) + k
         return slice(10 * link, 10 * link + 10), self.place_on_segment(self.segment_joint[link])[1]
