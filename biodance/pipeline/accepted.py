@@ -316,10 +316,11 @@ def accepted(result: SessionResult, inferred: Inferred, before: Identification |
         if worst is None or found.inferred is None:
             return found
         gone, (low, high) = found.findings[worst], (-100 * x for x in reversed(gains[worst]))
+        inferred = found.inferred.refuted(worst)
+        there = (gone.effect, gone.target) in inferred.idle
+        told = "is shown by the markers, and left out of the simulation" if there else "was taken back"
         said = f"accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
-        inferred = noted(
-            found.inferred.refuted(worst), f"{cause_in_words(gone.effect, gone.target)} was taken back: {said}"
-        )
+        inferred = noted(inferred, f"{cause_in_words(gone.effect, gone.target)} {told}: {said}")
     return SessionDiagnosis(inferred.diagnosis, inferred, before)
 
 
