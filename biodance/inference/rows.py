@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.diagnosis.candidates import Candidate, removed, slopes
-from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
+from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out, white
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Care, Case, Effect, effects
 from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.tolerances import Tolerances, between_laboratories, key_of, whitened
+from biodance.uncertainty.tolerances import Tolerances, between_laboratories, key_of
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
@@ -94,10 +94,7 @@ class Rows:
 
     def white(self, rows: Array) -> Array:
         """Return ``rows`` (r', n) of plates and markers in units of their nominal standard deviation."""
-        if self.problem is None:
-            return rows
-        band = self.problem.spectrum.band
-        return whitened(rows, band, marker_keys(self.problem), _mass(self.problem), self.tolerances)
+        return rows if self.problem is None else white(self.problem, self.tolerances, rows)
 
     def mean_square(self, rows: Array) -> Array:
         """Return (Q + 1,) the mean square of ``rows`` (r,) in each band and channel of the plates; zero in markers and
@@ -151,9 +148,7 @@ class Rows:
 
     @cached_property
     def _grown(self) -> Array:
-        """(n,) by how much the middle of an observation's trial lies after the middle of the session, -0.5 to 0.5; 0
-        for trials that are not simulated: they have no place in the session's time.
-        """
+        """(n,) how far after the session's middle an observation's trial lies, -0.5 to 0.5; 0 if not simulated."""
         cases = self.problem.cases if self.problem else ()
         after = {case.trial.name: float(case.session_time.mean()) - 0.5 for case in cases}
         seen = self.evidence.observations if self.evidence else ()
@@ -239,15 +234,15 @@ def _simulated(
     problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances, care: Mapping[str, Care]
 ) -> tuple[Array, Array, list[str], _Units]:
     """Return columns, target and groups of the simulated rows, and `Rows.tolerated`."""
-    known, keys = nuisances(problem, tolerated), marker_keys(problem)
+    known = nuisances(problem, tolerated)
     columns = np.concatenate(known.parts, axis=1, dtype=float) * known.scale
     # The mean of a tolerance is taken off the target, so that every column has mean zero and unit variance.
-    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), keys)
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
     sizes = np.array([tolerances.size(key) for key in known.keys])
     columns *= sizes
     # Body's columns, tolerances and target are whitened in one pass over the rows.
     both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
-    both = whitened(both, problem.spectrum.band, keys, _mass(problem), tolerances, out=both)
+    both = white(problem, tolerances, both, out=both)
     first = problem.sip.shape[1]
     units = {
         name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
@@ -258,9 +253,7 @@ def _simulated(
 def _with_observations(
     X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence, reach: Array
 ) -> tuple[Array, Array, list[str]]:
-    """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
-    shows in both.
-    """
+    """Return columns, target and groups with the observations below, in which tolerances of plates show, too."""
     own = np.array([one.sd for one in seen.observations])
     below = np.zeros((len(own), X.shape[1]))
     for name, (at, unit) in units.items():
@@ -275,9 +268,7 @@ def _with_observations(
 
 
 def _group(key: str, care: Mapping[str, Care]) -> str:
-    """Return the group of a key: what is alike in kind is as large, or as small, together; what was learned between
-    laboratories holds in this one as it is.
-    """
+    """Return the group of a key: alike in kind is as large together; learned between laboratories holds as it is."""
     if key in between_laboratories():
         return FIXED
     kind = key.removeprefix("habit ").split()[0]
@@ -300,7 +291,3 @@ def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:
     plates = (6 * problem.spectrum.band[:, None] + np.arange(6)).ravel()
     markers = np.full(len(problem.target) - plates.size, 6 * len(BANDS))
     return np.concatenate([plates, markers, np.full(count - len(problem.target), -1)])
-
-
-def _mass(problem: Problem) -> float:
-    return float(problem.cases[0].body.sip.mass.sum())
