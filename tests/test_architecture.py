@@ -78,7 +78,6 @@ ONE_ALGORITHM = {
     "dance/search/move.py": "a move within all limits: straight, slower, round about, exciting; each tries the next",
     "dance/search/postures.py": "the search for exciting postures: one, its image, sweeps over all, exchange",
     "dance/search/word_course.py": "the search from posture to posture of words: reach, choice, going back, refusal",
-    "inference/rows.py": "all evidence of a session as the rows and columns of one linear model",
     "inference/sets.py": "the search over sets of causes: score, fit, widen, lessen, again beside an unknown",
     "lab/plates/sense.py": "the directions of a plate: every hypothesis is judged by the same load on the same plate",
     "registration/__init__.py": "what is concluded of a pose, and the session that is written with it",

@@ -7,7 +7,7 @@ from inferred_sessions import inferred
 
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.of_family import of_family
+from biodance.diagnosis.plate_axes import of_family
 from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, effects, known_cause
 from biodance.pipeline.attention import headline
 from biodance.pipeline.words import alternatives, cause_of, in_words, spoken

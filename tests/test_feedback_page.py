@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import BROWSER, Page
+from direct_information import whiten
 from PIL import Image
 from scipy.spatial.transform import Rotation
 from small_dances import small_dance
@@ -168,7 +169,7 @@ def gathered(body: Body, motion: Motion, told: MovementInformation, *, held: boo
         rows = (wrench_shift(told.about) @ W[-1])[2:5]
         return rows.T @ (told.still[:, None] * rows)
     noise = Noise(np.array([np.diag(1.0 / row) for row in told.weights]), told.about, Bands(told.edges, told.rate))
-    white = noise.whiten(W).reshape(-1, W.shape[2])
+    white = whiten(noise, W).reshape(-1, W.shape[2])
     return white.T @ white
 
 

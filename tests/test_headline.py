@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from example_results import LEFT, VERDICTS
 
+from biodance.diagnosis.accept import Gain
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, STRANGE, DiagnosisStatus, Reason
 from biodance.effects import QualityCheck, causes
 from biodance.pipeline.attention import headline

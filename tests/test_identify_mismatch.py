@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from direct_information import whiten
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.human.human import human
@@ -148,7 +149,7 @@ def test_weighted_rows_are_whitened_twice() -> None:
         Noise(factor @ np.swapaxes(factor, 1, 2), np.array([0.2, 0.1, 0.0]), Bands((0.0, 1.0, 8.0), 25.0)),
         Noise(factor[:1] @ np.swapaxes(factor[:1], 1, 2), np.array([0.2, 0.1, 0.0])),
     ):
-        white = [noise.whiten(x).reshape(-1, 3) for x in (rows, other)]
+        white = [whiten(noise, x).reshape(-1, 3) for x in (rows, other)]
         np.testing.assert_allclose(
             np.einsum("tci,tcj->ij", other, noise.weighted(rows)), white[1].T @ white[0], rtol=1e-9
         )

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from direct_information import information
+from direct_information import information, whiten
 from random_bodies import random_body, random_motion
 
 from biodance.body.parts import pseudo_inertia, smallest_eigenvalues
@@ -35,8 +35,8 @@ def drawn(seed: int, frames: int = 300):
 def test_posterior_equals_the_textbook_formula() -> None:
     body, prior, motion, wrench, _ = drawn(0)
     found = find_posterior(information(body, motion, wrench, NOISE), prior)
-    W = NOISE.whiten(regressor(body, motion)).reshape(-1, 40)
-    y = NOISE.whiten(wrench.value[:, :, None]).ravel()
+    W = whiten(NOISE, regressor(body, motion)).reshape(-1, 40)
+    y = whiten(NOISE, wrench.value[:, :, None]).ravel()
     precision = np.linalg.inv(prior.covariance) + W.T @ W
     covariance = np.linalg.inv(precision)
     mean = covariance @ (np.linalg.inv(prior.covariance) @ prior.phi + W.T @ y)

@@ -16,8 +16,8 @@ from identified_sessions import RATE, body, movement, truth
 from shared_markers import markers_asked_once
 
 from biodance.cli import run
+from biodance.diagnosis.accept import Gain
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.gain import Gain
 from biodance.effects.axis_error import moment_point
 from biodance.identification.identification import identify_body
 from biodance.identification.statistics import Fit

@@ -10,9 +10,9 @@ import pytest
 from example_results import full_session
 from identified_sessions import session_result
 
+from biodance.diagnosis.accept import Gain
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.gain import Gain
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import describe_movement
 from biodance.report.files import tables_folder, write_tables

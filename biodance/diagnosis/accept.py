@@ -2,20 +2,19 @@
 gains elsewhere.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.diagnosis.gain import Gain
 from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import BLOCK_SECONDS, FEWEST_BLOCKS, block_interval, removed_share
 from biodance.lab.prepare import highest_frequency
 from biodance.motion.dynamics import predict_wrench
-from biodance.records import Array
+from biodance.records import Array, freeze
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS
 
@@ -66,6 +65,35 @@ def residuals_of(body: Body, fits: tuple[Fit, ...], about: Array) -> Residuals:
     return Residuals(names, left, use, rate, cutoff)
 
 
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """What a finding gains on trials that were not used to find it: all findings accepted, against all but this one
+    with the rest fitted again (a single one: against the model in use, identified body and nominal laboratory).
+
+    ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``channels`` (6, 2) 95 % interval
+    of the share of it that the finding removes (0.2 = a fifth, negative = it adds); ``ci95`` (2,) the same for all
+    channels together, each in units of what the accepted model leaves of the trials that were used (excludes 0: a
+    proven gain); ``score``, ``score_se`` change of the log predictive density per second, natural logarithm, with
+    standard error; ``trials`` judged on.
+    """
+
+    rms_before: Array
+    rms_after: Array
+    ci95: tuple[float, float]
+    trials: tuple[str, ...]
+    score: float = float("nan")
+    score_se: float = float("nan")
+    channels: Array = field(default_factory=lambda: np.full((6, 2), np.nan))
+
+    def __post_init__(self) -> None:
+        freeze(self, "Gain", channels=(6, 2), rms_before=(6,), rms_after=(6,))
+
+    @property
+    def proven(self) -> bool:
+        """Whether the interval excludes zero."""
+        return self.ci95[0] > 0
+
+
 def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residuals, Residuals]) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
@@ -77,9 +105,8 @@ def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residua
     BiodanceError
         There are fewer than three blocks of one second: no interval can be given.
     """
-    pairs = [
-        (_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)
-    ]
+    aligned = zip(before.left, after.left, before.use, before.rate, strict=True)
+    pairs = [(_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in aligned]
     a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
     if len(a) < FEWEST_BLOCKS:
         raise BiodanceError(
@@ -127,10 +154,6 @@ def join_residuals(first: Residuals, second: Residuals) -> Residuals:
     return Residuals(*(getattr(first, one.name) + getattr(second, one.name) for one in fields(Residuals)))
 
 
-def _aligned(before: Residuals, after: Residuals) -> list[tuple[Array, Array, NDArray[np.bool_], float]]:
-    return list(zip(before.left, after.left, before.use, before.rate, strict=True))
-
-
 def _rms(found: Residuals) -> Array:
     """Return (6,) root mean square over the used frames of all trials."""
     return np.sqrt(
@@ -158,9 +181,7 @@ def _coefficients(found: Residuals) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _log_density(found: Residuals, fitted: Residuals) -> tuple[Array, NDArray[np.intp]]:
-    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials
-    used, and the bands (n,).
-    """
+    """Return (n,) log predictive densities under the residual covariance per band of the trials used, and the bands."""
     values, bands = _coefficients(found)
     known, known_bands = _coefficients(fitted)
     out = np.zeros(len(values))

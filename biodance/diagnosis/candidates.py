@@ -163,9 +163,7 @@ def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
 
 
 def _in_rows(problem: Problem, effect: Effect, sizes: Array, wrench: Callable[[Case, Array], Array]) -> Array:
-    """Return (r, k): the rows of ``wrench`` (T, 6) of every case, and of the markers, for each of the ``sizes`` (p, k)
-    of the cause.
-    """
+    """Return (r, k): the rows of ``wrench`` (T, 6) of all cases, and of markers, for each of ``sizes`` (p, k)."""
     if effect.linear:
         return np.asarray(problem.unit(effect) @ sizes)
     rows = problem.spectrum.rows(np.stack([wrench(case, one) for one in sizes.T], axis=2) for case in problem.cases)

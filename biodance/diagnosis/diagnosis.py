@@ -12,7 +12,6 @@ import numpy as np
 
 from biodance import display
 from biodance.diagnosis.consequence import Adequacy, Unobservable
-from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
 from biodance.effects import known_cause
 from biodance.identification.knowledge import SIGMAS
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from biodance.diagnosis.accept import Gain
     from biodance.diagnosis.witness_evidence import ObservedEvidence
     from biodance.effects import Cause, Checked, QualityCheck
 
@@ -107,7 +107,7 @@ class Finding:
     parameters: tuple[Estimate, ...]
     set: tuple[Alias, ...]
     visible_fraction: float
-    gain: Gain | None = None
+    gain: "Gain | None" = None
     advice: str = ""
     changes: tuple[str, ...] = ()
     trials: tuple[str, ...] = ()

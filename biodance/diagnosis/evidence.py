@@ -45,21 +45,13 @@ class LinearPosterior:
         """Return the posterior for another target ``y`` (r,) with the same columns."""
         return cls(X, y, factor, _solved(factor, X.T @ y))
 
-    def covariance(self, rows: Array) -> Array:
-        """Return the posterior covariance of ``rows`` (q, K) @ coefficients."""
-        # A^-1 is the posterior covariance of the coefficients.
-        return np.asarray(rows @ _solved(self.factor, rows.T))
-
     def score(self, Z: Array) -> tuple[Array, Array]:
         """Return s (k,) and G (k, k) of whitened columns ``Z`` (r, k)."""
-        half = self.half(self.X.T @ Z)
-        # half = L^-1 X'Z: Z'Z - half'half is the Schur complement of A.
+        half = self.X.T @ Z
+        if half.size:
+            # half = L^-1 X'Z: Z'Z - half'half is the Schur complement of A.
+            half = np.asarray(dtrtrs(self.factor[0], half, lower=self.factor[1])[0])
         return Z.T @ self.residual, Z.T @ Z - half.T @ half
-
-    def half(self, cross: Array) -> Array:
-        """Return H (K, k) with H' H = C' A^-1 C of ``cross`` C = X' Z (K, k)."""
-        # Triangular solve: C'A^-1 C = |L^-1 C|².
-        return np.asarray(dtrtrs(self.factor[0], cross, lower=self.factor[1])[0]) if cross.size else cross
 
     def free(self, Z: Array) -> Array:
         """Return the part of whitened columns ``Z`` (r, k) that no tolerance can explain; the score of any target is
@@ -79,36 +71,6 @@ def linear_posterior(X: Array, y: Array) -> LinearPosterior:
     # A = 1 + X'X: data and unit-normal prior.
     factor = cho_factor(X.T @ X + np.eye(X.shape[1]), lower=True)
     return LinearPosterior.for_target(X, factor, y)
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """One cause under the score test: ``log_bayes_factor`` against nothing wrong; posterior ``mean`` (k,) and
-    ``covariance`` (k, k) of its coefficients; ``visible`` share of its size that is left when all that is no fault may
-    adapt.
-    """
-
-    log_bayes_factor: float
-    mean: Array
-    covariance: Array
-    visible: float
-
-
-def evidence(s: Array, G: Array, length: float) -> Evidence:
-    """Return the evidence from the score ``s`` (k,), its information ``G`` (k, k) and the squared length of the
-    whitened columns.
-    """
-    inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
-    mean = inner @ s
-    # log Bayes factor of unit-normal coefficients: 1/2 s'(1 + G)^-1 s - 1/2 log|1 + G|.
-    value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
-    return Evidence(value, mean, inner, visible(G, length))
-
-
-def visible(G: Array, length: float) -> float:
-    """Return the share of a cause that is left when all that is no fault may adapt, as `evidence` has it."""
-    # tr(G) over the squared length: share of the square that no nuisance explains.
-    return float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0
 
 
 def surely_reached(G: Array, shift: Array) -> float:

@@ -163,4 +163,4 @@ def session_of(motion: Motion, seconds: float) -> tuple[Motion, ...]:
     """Return a long movement cut into trials of about ``seconds``."""
     count = max(1, round(float(motion.time[-1] - motion.time[0]) / seconds))
     pieces = np.array_split(np.arange(motion.time.size), count)
-    return tuple(Motion(motion.time[i], motion.q[i], motion.v[i], motion.a[i]) for i in pieces)
+    return tuple(map(motion.at, pieces))

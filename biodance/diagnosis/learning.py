@@ -43,13 +43,17 @@ def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     """Return a session without fault as `learn` wants it; ``causes`` all of the family."""
     known = nuisances(problem, causes)
     own = ("",) * problem.sip.shape[1]
-    mass = float(problem.cases[0].body.sip.mass.sum())
     columns = np.concatenate(known.parts, axis=1) * known.scale
     every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
-    where = problem.spectrum
-    movement = needed(problem.cases, where)
     return Null(
-        problem.target, every, own + known.keys, where.band, marker_keys(problem), mass, movement, own + known.means
+        problem.target,
+        every,
+        own + known.keys,
+        problem.spectrum.band,
+        marker_keys(problem),
+        problem.mass,
+        needed(problem.cases, problem.spectrum),
+        own + known.means,
     )
 
 
@@ -59,24 +63,18 @@ def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 
     believed like ``worth`` sessions more.
     """
     sessions = tuple(nulls)
+    share = worth / (worth + len(sessions))
 
     def improved(known: Tolerances) -> Tolerances:
-        return _beside(start, worth, _improved(sessions, known), len(sessions))
+        fresh = _improved(sessions, known)
+        # Mean squares, not deviations, are averaged by their worth in sessions.
+        squares = {key: (1 - share) * size**2 + share * start.size(key) ** 2 for key, size in fresh.sizes.items()}
+        sizes = {key: float(np.sqrt(square)) for key, square in squares.items()}
+        return replace(fresh, sizes=sizes, noise=(1 - share) * fresh.noise + share * start.noise)
 
     found = maximise(start, improved, lambda known: known.noise, rounds=rounds)
-    share = worth / (worth + len(sessions))
     moved = np.mean([null.movement for null in sessions], axis=0)
     return replace(found, movement=(1 - share) * moved + share * start.movement)
-
-
-def _beside(start: Tolerances, worth: float, learned: Tolerances, count: int) -> Tolerances:
-    """Return what ``count`` sessions say beside what ``worth`` sessions said before: mean squares."""
-    share = worth / (worth + count)
-    # Mean squares, not deviations, are averaged by their worth in sessions.
-    sizes = {
-        key: float(np.sqrt((1 - share) * size**2 + share * start.size(key) ** 2)) for key, size in learned.sizes.items()
-    }
-    return replace(learned, sizes=sizes, noise=(1 - share) * learned.noise + share * start.noise)
 
 
 def shown_by(nulls: Iterable[Null], found: Tolerances) -> dict[str, float]:
@@ -95,10 +93,7 @@ def shown_by(nulls: Iterable[Null], found: Tolerances) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """What one session says of its coefficients: ``value``, ``variance`` (K,) in their own units, NaN for those without
-    a size; ``left`` (r,) what their means leave of the target; ``spread`` (r, k) a square root of the covariance of
-    what they explain.
-    """
+    """What one session says of its coefficients, NaN without a size; ``spread`` (r, k) a root of what stays unsure."""
 
     value: Array
     variance: Array

@@ -42,8 +42,8 @@ class Model:
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
     """Return ``rows`` (r, n) of the problem in units of their standard deviation, in ``out`` or a new array."""
-    where, mass = problem.spectrum, float(problem.cases[0].body.sip.mass.sum())
-    return whitened(rows, where.band, marker_keys(problem), mass, tolerances, loud=where.loud, out=out)
+    where = problem.spectrum
+    return whitened(rows, where.band, marker_keys(problem), problem.mass, tolerances, loud=where.loud, out=out)
 
 
 def marker_keys(problem: Problem) -> tuple[str, ...]:
@@ -88,20 +88,14 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
         keys += [own] * width
         means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))
         if one.names in problem.shown:
-            parts.append(_where_not_shown(problem, one.basis))
+            # In the rows of sizes shown what everybody does by habit is taken off already (`Effect.shown`).
+            habit = np.array(one.basis)
+            habit[len(habit) - len(problem.shown) :] = 0.0
+            parts.append(habit)
             scale += scale[-width:]
             keys += [HABIT + key] * width
             means += [""] * width
     return Nuisances(tuple(parts), np.array(scale), tuple(keys), tuple(means), tolerated)
-
-
-def _where_not_shown(problem: Problem, columns: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return ``columns`` (r, k) with zero in the rows of sizes shown: what everybody does by habit is taken off there
-    already (`Effect.shown`).
-    """
-    out = np.array(columns)
-    out[len(out) - len(problem.shown) :] = 0.0
-    return out
 
 
 def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:

@@ -124,9 +124,7 @@ class Visibility:
 
 
 def _really_seen(found: Model, one: Candidate, size: float, need: float) -> float:
-    """Return the size from which a cause that is not in proportion to its size surely passes ``need``, from the
-    ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
-    """
+    """Return the size from which a cause not in proportion to its size surely passes ``need``; infinite if none."""
     Z, first = found.white(one.basis.astype(float)), np.eye(len(one.silent))[0]
     free = found.posterior.free(Z)
     G = Z.T @ free

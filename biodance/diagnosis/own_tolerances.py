@@ -66,7 +66,8 @@ def own_tolerances(
     no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
-    postures = _postures(chosen)
+    middle = [window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size]
+    postures = np.array(middle[:_POSTURES])
     about = standing_point(tuple(window.fit for window in chosen))
     if recorded and postures.size:
         found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
@@ -97,12 +98,6 @@ def own_tolerances(
         notes.append(_unrest_note(shaken))
     zeros = of_zeros([run for window in chosen for run in window.runs])
     return SessionTolerances(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
-
-
-def _postures(chosen: tuple[TrialWindow, ...]) -> Array:
-    """Return the middle postures (n, nq) of the first trials."""
-    middle = [window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size]
-    return np.array(middle[:_POSTURES])
 
 
 def _looked_at(body: Body, windows: tuple[TrialWindow, ...], about: Array) -> tuple[tuple[Case, ...], Spectrum]:

@@ -1,16 +1,32 @@
-"""A channel of the laboratory in a plate's own axes: what the amplifier and the maker's software call it."""
+"""Findings dressed for the reader: with the effects themselves, and channels in the axes of their plate, as the
+amplifier and the maker's software call them.
+"""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Finding
+from biodance.diagnosis.diagnosis import Diagnosis, Finding
+from biodance.effects import Cause
 from biodance.records import Plate
 
 _CHANNEL = re.compile(r"(?:(?P<plate>plate\w*):)?(?P<first>[FM][xyz])(?:->(?P<second>[FM][xyz]))?$")
 _ALONG = np.cos(np.radians(20.0))
 """Cosine from which on an axis of the laboratory is one of the plate's."""
+
+
+def of_family(one: Diagnosis, family: Mapping[str, Cause]) -> Diagnosis:
+    """Return the diagnosis whose findings hold their effects of the ``family`` that was asked: what is known of one
+    that was given as an object stands nowhere else.
+    """
+
+    def known(finding: Finding) -> Finding:
+        alike = tuple(replace(alias, kind=family.get(alias.effect)) for alias in finding.set)
+        return replace(finding, kind=family.get(finding.effect), set=alike)
+
+    return replace(one, findings=tuple(map(known, one.findings)), resembles=tuple(map(known, one.resembles)))
 
 
 def in_plate_axes(target: str, plates: tuple[Plate, ...]) -> str:

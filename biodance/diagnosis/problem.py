@@ -69,9 +69,7 @@ class TrialWindow:
 
 
 def _bridged(trial: Trial) -> Trial:
-    """Return the trial with straight lines where the force of a plate is unknown, so that effects can move it in time;
-    such frames are never compared.
-    """
+    """Return the trial with straight lines where a plate's force is unknown: such frames are never compared."""
     plates = []
     for plate in trial.plates:
         time, value = plate.wrench.time, plate.wrench.value
@@ -116,6 +114,11 @@ class Problem:
     def wrench_rows(self) -> int:
         """Number of rows that come from the plates: six per coefficient."""
         return 6 * self.spectrum.band.size
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body before the data, kg."""
+        return float(self.cases[0].body.sip.mass.sum())
 
     def padded(self, rows: Array) -> Array:
         """Return (r,): ``rows`` (m, 6) of the plates, and nothing in the others."""
@@ -242,25 +245,17 @@ def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[t
 
 
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> Iterator[tuple[int, NDArray[np.intp], Errors]]:
-    """Return the elementary errors of every run of every trial, with the trial's index and the run's frames; one after
-    the other, because they are large.
-    """
+    """Yield the errors of every run with its trial's index and frames, one after the other: they are large."""
     sources = of_clusters(parts_as_segments(body))
     for index, (case, picks) in enumerate(zip(cases, where.picks, strict=True)):
         for pick in picks:
-            yield index, pick, forward(sources, _part(case.motion, pick))
-
-
-def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
-    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+            yield index, pick, forward(sources, case.motion.at(pick))
 
 
 def _kinematic_rows(
     where: Spectrum, errors: Iterable[tuple[int, NDArray[np.intp], Errors]], sizes: int
 ) -> tuple[NDArray[np.float32], tuple[tuple[str, str], ...]]:
-    """Return the rows (r, K) of the errors: of their wrenches, of the mean marker residuals, signs as `forward` has
-    them, and of so many ``sizes`` shown, in which they are not; and the group and joint of each error (K).
-    """
+    """Return the rows (r, K) of the errors: wrenches, mean markers, no ``sizes`` shown; and group and joint of each."""
     wrench: list[NDArray[np.float32]] = []
     names: tuple[tuple[str, str], ...] = ()
     markers, frames = np.zeros(()), 0
@@ -284,9 +279,7 @@ def _shares(where: Spectrum, count: int) -> Array:
 
 
 def _mean_markers(cases: tuple[Case, ...], where: Spectrum) -> Array:
-    """Return (M, 3) m: mean residual of every marker of the body over the session; zero for a marker that was never
-    seen.
-    """
+    """Return (M, 3) m: mean residual of every marker of the body over the session; zero if never seen."""
     out = np.zeros((len(cases[0].body.markers.names), 3))
     for case, weight in zip(cases, _shares(where, len(cases)), strict=True):
         out[list(case.marker_columns)] += weight * case.marker_residual

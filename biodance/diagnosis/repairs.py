@@ -95,10 +95,7 @@ def unplaced_markers(body: Body) -> frozenset[str]:
 
 
 def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Finding:
-    """Return a joint that lies elsewhere, as far as the movement shows it (`JointError.reach`): no surer than that, and
-    than static trials place joints. A bone of another length, its other joint and the one of the ``markers`` that
-    places it look the same.
-    """
+    """Return a joint that lies elsewhere as far as movement shows it, no surer than static trials place joints."""
     far, shown = (error.reach, error.reach_sd) if error.reach else (error.moved, error.centre)
     sd = float(np.hypot(centre_sd(error.joint), shown))
     found = _named(replace(effect, target=error.joint), [("shift", far)], sd)

@@ -72,9 +72,7 @@ class RobotCause:
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Names and meaning of all columns beside the parameters (None: a place on the plate): ``usual`` and ``wide`` (k,)
-    standard deviations; ``places`` first column and number of every trial's places.
-    """
+    """All columns beside the parameters (None: a place on the plate), ``usual`` and ``wide`` (k,) deviations."""
 
     causes: tuple[RobotCause | None, ...]
     usual: Array
@@ -124,9 +122,7 @@ def _cause_columns(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[Ro
 
 
 def _legs_and_pairs(body: Body, torque: Array) -> list[tuple[int, ...]]:
-    """Return every joint of the legs alone, and each of the right with its like of the left where both bear ``torque``
-    (n,) N·m.
-    """
+    """Return every joint of the legs, and each right one with its left where both bear ``torque`` (n,) N·m."""
     right, left = leg_chains(body)
     pairs = [pair for pair in zip(right, left, strict=False) if len(right) == len(left) and pair[0] != pair[1]]
     both = [pair for pair in pairs if torque[list(pair)].min() > _ALIKE * torque[list(pair)].max()]
@@ -147,18 +143,8 @@ def _plate_causes() -> list[RobotCause]:
     return out
 
 
-def _motion_changes(body: Body, one: RobotMotion, causes: tuple[RobotCause, ...]) -> Array:
-    """Return the change (T / `THINNED`, 6, k) of the wrench that a trial needs by one unit of every cause of motion."""
-    found = loads(body, one.grounded, one.fit.wrench.value)
-    units = [_unit(one, cause, found) for cause in causes]
-    angles, tilts = (np.stack(some, axis=2) for some in zip(*units, strict=True))
-    return angle_changes(body, one.grounded, one.angle, angles, tilts)
-
-
 def _unit(one: RobotMotion, cause: RobotCause, found: Loads) -> tuple[Array, Array]:
-    """Return by how much the joints (T, n) and the standing sole (T, 3), rad, are not where one unit of a cause shows
-    them.
-    """
+    """Return by how much the joints (T, n) and the sole (T, 3), rad, are not where one unit of a cause shows them."""
     angle, tilt, some = np.zeros_like(one.angle), np.zeros((len(one.angle), 3)), list(cause.joints)
     match cause.kind:
         case "encoder_zero":
@@ -195,7 +181,6 @@ _SHARED = 0.15
 """Of what gives or has play: how far its size may be off because nobody knows how two standing feet share the load."""
 _MOST = 4
 """Causes that are looked for, one after the other."""
-_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -226,7 +211,8 @@ def robot_causes(
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
     noise = replace(columns.layout, covariance=np.tile(robot_start(body), (len(columns.layout.bands), 1, 1)))
     while True:
-        first, *rest = _gathered(body, trials, len(fitted), columns)
+        parts, count = [_products(body, one, columns, k) for k, one in enumerate(trials)], len(fitted)
+        first, *rest = (sum(some[1:], some[0]) for some in (parts[:count], parts[count:]) if some)
         noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), robot_start(body))
         fit = _equations(first, noise)
         every = _equations(sum(rest, first), noise)
@@ -282,16 +268,14 @@ def _refined(
     return out, trials
 
 
-def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: _Columns) -> list[Statistics]:
-    """Return the second moments of the ``fitted`` first trials, and of the others where there are some."""
-    parts = [_products(body, one, columns, k) for k, one in enumerate(trials)]
-    return [sum(some[1:], some[0]) for some in (parts[:fitted], parts[fitted:]) if some]
-
-
 def _products(body: Body, one: RobotMotion, columns: _Columns, trial: int) -> Statistics:
     """Return the second moments of [W S, causes, what the drawing leaves] of one trial."""
     S, layout = prior_factor(body.sip), columns.layout
-    changes = _motion_changes(body, one, columns.of_motion)
+    # The change (T / `THINNED`, 6, k) of the wrench by one unit of every cause of motion.
+    found = loads(body, one.grounded, one.fit.wrench.value)
+    units = [_unit(one, cause, found) for cause in columns.of_motion]
+    angles, tilts = (np.stack(part, axis=2) for part in zip(*units, strict=True))
+    changes = angle_changes(body, one.grounded, one.angle, angles, tilts)
     plates, fit, slow = plate_sources(), one.fit, slow_wrench(body, one.grounded, one.angle)
     count = S.shape[1] + len(columns.causes)
     first, some = columns.places[trial]
@@ -324,7 +308,7 @@ def _learned(total: Statistics, noise: Noise, sd: Array, start: Array) -> Noise:
         left = noise_of(total.moments(covariance @ b, covariance), start=start, worth=WORTH)
         return replace(before, covariance=left)
 
-    return maximise(noise, improved, lambda one: one.covariance, rounds=_ROUNDS, tolerance=1e-2)
+    return maximise(noise, improved, lambda one: one.covariance, rounds=12, tolerance=1e-2)
 
 
 def _posterior(A: Array, sd: Array) -> Array:

@@ -85,14 +85,6 @@ def said_of_markers(time: float, worst: Sequence[str], pair: tuple[str, str, flo
     return LiveWarning(time, MarkerMisplaced.name, worst[0], text)
 
 
-def _slow_variance(values: Array) -> Array:
-    """Return the variance (6,) of means over half a second of ``values`` (n, 6), a tenth of a second each: what moves
-    faster hardly shows in the mean of a second.
-    """
-    blocks = len(values) // _HALF
-    return np.asarray(values[-blocks * _HALF :].reshape(blocks, _HALF, -1).mean(axis=1).var(axis=0))
-
-
 @dataclass
 class WrenchWatch:
     """Means over a tenth of a second of regressor (6, p) and measured wrench (6,): those ``before``, from while nothing
@@ -126,8 +118,11 @@ class WrenchWatch:
         jump = latest.mean(axis=0) - usual.mean(axis=0)
         # Uncertain parameters count through the difference of the regressors: what both share cancels.
         _, unknown = posterior.expected(W1.mean(axis=0) - W0.mean(axis=0))
+        # Of means over half a second: what moves faster hardly shows in the mean of a second.
+        blocks = len(usual) // _HALF
+        slow = usual[-blocks * _HALF :].reshape(blocks, _HALF, -1).mean(axis=1).var(axis=0)
         # At `SIGMAS_OF_A_JUMP` deviations a jump is at least `_SMALLEST_JUMP` of the weight.
-        sd = np.sqrt(_slow_variance(usual) + unknown + (_SMALLEST_JUMP * self.weight / SIGMAS_OF_A_JUMP) ** 2)
+        sd = np.sqrt(slow + unknown + (_SMALLEST_JUMP * self.weight / SIGMAS_OF_A_JUMP) ** 2)
         size = np.abs(jump) / sd
         self.wrong = bool((size > SIGMAS_OF_A_JUMP).any())
         return (jump, size) if self.wrong else None

@@ -66,22 +66,19 @@ class ObservedEvidence:
     @cached_property
     def counting(self) -> "ObservedEvidence":
         """Only the observations that count as evidence."""
-        kept = np.array([one.counts for one in self.observations], dtype=bool)
-        return ObservedEvidence(
-            tuple(one for one in self.observations if one.counts),
-            self.causes,
-            {name: column[kept] for name, column in self.sensitivities.items()},
-            {name: value[kept] for name, value in self.sign_reversed.items()},
-            self.seconds,
-            self.recorded,
-        )
+        return self.where(np.array([one.counts for one in self.observations], dtype=bool))
+
+    def where(self, kept: NDArray[np.bool_]) -> "ObservedEvidence":
+        """Return the evidence of the observations ``kept`` (n,) alone."""
+        found = tuple(one for one, here in zip(self.observations, kept, strict=True) if here)
+        columns = {name: column[kept] for name, column in self.sensitivities.items()}
+        turned = {name: value[kept] for name, value in self.sign_reversed.items()}
+        return replace(self, observations=found, sensitivities=columns, sign_reversed=turned)
 
     def only(self, names: Collection[str]) -> "ObservedEvidence":
-        """Return the evidence of some observations alone, by the names of their observers."""
-        kept = [i for i, one in enumerate(self.observations) if one.observer in names]
-        columns = {name: column[kept] for name, column in self.sensitivities.items()}
-        found = tuple(self.observations[i] for i in kept)
-        return replace(self, observations=found, sensitivities=columns, sign_reversed={})
+        """Return the evidence of some observations alone, by the names of their observers; signs are not asked for."""
+        kept = np.array([one.observer in names for one in self.observations], dtype=bool)
+        return replace(self.where(kept), sign_reversed={})
 
     def columns(self, effect: str, target: str, parameters: Sequence[str]) -> Array:
         """Return (n, p) what one unit of each of the ``parameters`` (p) of an effect adds to the observations; 0 where
@@ -130,8 +127,8 @@ class ObservedEvidence:
         best = max(size, key=lambda name: size[name], default=("", ""))
         return best if size.get(best, 0.0) * _FAULT > _UNRESPONSIVE * self.observations[index].expected_sd else ("", "")
 
-    def detected_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
-        """Return the observers that detect the usual fault of a cause at ``least`` standard deviations, over all their
+    def detected_by(self, cause: tuple[str, str]) -> tuple[str, ...]:
+        """Return the observers that detect the usual fault of a cause at one standard deviation, over all their
         observations; () if none does.
         """
         size = self.causes[cause].step * _FAULT
@@ -139,7 +136,7 @@ class ObservedEvidence:
         for one, column in zip(self.observations, self.sensitivities[cause], strict=True):
             # Squares in standard deviations add over independent observations.
             total[one.observer] = total.get(one.observer, 0.0) + (size * column / one.expected_sd) ** 2
-        return tuple(name for name, power in total.items() if power**0.5 >= least)
+        return tuple(name for name, power in total.items() if power**0.5 >= 1.0)
 
 
 @dataclass(frozen=True)

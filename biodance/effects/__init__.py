@@ -73,7 +73,9 @@ def missing(candidate: object) -> tuple[str, ...]:
         return ("the base class Effect or DiscreteEffect",)
     lacks = ["a name"] if not kind.name else []
     lacks += sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else []
-    if issubclass(kind, Effect) and kind.columns is Effect.columns and kind.transform is Effect.transform:
+    if issubclass(kind, Effect) and all(
+        getattr(kind, name) is getattr(Effect, name) for name in ("columns", "transform", "added")
+    ):
         lacks.append("columns or transform")
     return tuple(lacks)
 

@@ -54,10 +54,6 @@ class AddedMass(Effect):
         """Return every segment."""
         return case.body.segments
 
-    def transform(self, case: Case, theta: Array) -> Case:
-        """Return the case whose plates also carry the load (the first plate takes it when there are several)."""
-        return case.with_added(case.trial.plates[0], self.added(case, theta))
-
     def added(self, case: Case, theta: Array) -> Array:
         """Return (T, 6) the wrench that the load needs."""
         load = point_mass(theta[0], self.origin(case)[1:] + np.asarray(theta[1:4]))

@@ -1,6 +1,4 @@
-"""A channel or an axis of a force plate points the other way, or axes are exchanged: cabling, corners counted from
-another one.
-"""
+"""A channel or an axis of a force plate points the other way, or axes are exchanged."""
 
 from dataclasses import replace
 

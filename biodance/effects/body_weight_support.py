@@ -65,25 +65,20 @@ class BodyWeightSupport(Effect):
         """Return the pelvis and the trunk; the root's segment of other bodies."""
         return tuple(name for name in case.body.segments if name in ("pelvis", "trunk_head")) or case.body.segments[:1]
 
-    def transform(self, case: Case, theta: Array) -> Case:
-        """Return the case whose plates miss what the rope carries."""
-        return case.with_added(self.plate_of(case), self.added(case, theta))
-
     def added(self, case: Case, theta: Array) -> Array:
         """Return (T, 6) minus the wrench of the rope: what it carries, the plates miss."""
         force, stiffness, high, *aside, longer = theta
         point, upright = self._tied(case, high)
         rope = max(ROPE + longer, _SHORTEST)
-        hook = np.array([*(_middle(case) + aside), upright + rope])
+        middle = np.mean([plate.centre[:2] for plate in case.trial.plates], axis=0)
+        hook = np.array([*(middle + aside), upright + rope])
         length = np.linalg.norm(hook - point, axis=1)
         # Direction times tension: divided by the length once.
         pull = (force + stiffness * (length - rope)) / length
         return -wrench_of_force(pull[:, None] * (hook - point), point)
 
     def _tied(self, case: Case, high: float) -> tuple[Array, float]:
-        """Return where the rope is tied (T, 3) m, and how high over the floor that is on a person who stands
-        upright.
-        """
+        """Return where the rope is tied (T, 3) m, and how high over the floor on a person who stands upright."""
         body, index = case.body, case.body.segment_index(self.target)
         place = case.phi[None, 10 * index + 1 : 10 * index + 4] / case.phi[10 * index] + [0.0, high, 0.0]
         standing = poses(body, body.neutral)
@@ -103,11 +98,6 @@ class BodyWeightSupport(Effect):
         tied = case.phi[10 * index + 2] / case.phi[10 * index] + theta[2]
         weight = case.body.sip.mass.sum() * np.linalg.norm(case.body.gravity)
         return bool(0 < theta[0] <= weight and low <= tied <= high)
-
-
-def _middle(case: Case) -> Array:
-    """Return the middle of all plates (2,) m."""
-    return np.mean([plate.centre[:2] for plate in case.trial.plates], axis=0)
 
 
 EFFECT = BodyWeightSupport

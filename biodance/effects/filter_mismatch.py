@@ -71,9 +71,7 @@ class FilterMismatch(Effect):
 
 
 def _passed(case: Case, value: Array, lower: float) -> Array:
-    """Return ``value`` (T, 6) through a filter whose cut-off lies ``lower`` Hz under the reference; a negative one does
-    not raise more what lies over the reference.
-    """
+    """Return ``value`` (T, 6) through a filter whose cut-off lies ``lower`` Hz under the reference, or above it."""
     change = STRENGTH * lower
     # (frequency of the cosine)^4, as of a second-order Butterworth's squared gain.
     steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4

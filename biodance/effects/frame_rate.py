@@ -24,7 +24,6 @@ FITS = 0.9
 """Least share of the moving wrench that body and clock together must explain, or nothing is said (nulls, wrong
 clocks: 0.97 and more).
 """
-_STEPS = 8
 COARSE = 20.0
 """Hz: movement below BAND needs no more samples than these."""
 _NOISE = np.array([3.0, 3.0, 3.0, 1.5, 1.5, 1.0])
@@ -169,7 +168,7 @@ def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
     factor, phi, square = prior_factor(widened_prior(body.sip)), body.sip.phi, 1.0
     measured, heavy, driven = (np.concatenate(parts) for parts in zip(*map(_slow_parts, cases), strict=True))
     away = np.zeros(factor.shape[1])
-    for _ in range(_STEPS):
+    for _ in range(8):
         here = phi + factor @ away
         # Columns: parameters in prior standard deviations, then the square of the clock's ratio.
         slopes = np.column_stack([(heavy + square * driven) @ factor, driven @ here])
@@ -185,10 +184,7 @@ def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
 
 
 def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
-    """Return the cosine coefficients below BAND, over NOISE, of the measured wrench (n,), and of the regressors of
-    weight and of acceleration (n, 10N), about the point on the floor where the person stands; the weight is made to
-    fit.
-    """
+    """Return slow coefficients of the wrench (n,), and of the regressors of weight and acceleration (n, 10N)."""
     skip, edge = max(1, int(case.motion.rate / COARSE)), int(_EDGE * case.motion.rate)
     take = slice(edge, -edge, skip)
     motion = case.motion

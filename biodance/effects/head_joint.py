@@ -6,33 +6,21 @@ from biodance.body.body import Body
 from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import neck_and_vertex, share_of_body
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint
+from biodance.effects._base.missing_joint import MissingJoint, angle_and_beyond
 from biodance.effects._base.words import About, CauseWords, CheckKind
 
 _AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
-_MARKERS = 3
 
 
 class HeadJoint(MissingJoint):
     """The head turns by ``angle`` (rad rms per axis) on the trunk, in the course of time that its markers show."""
 
     name = "head_joint"
-    parameters = (
-        Parameter(
-            "angle",
-            "rad",
-            0.10,
-            "5-15 deg rms of head movement in whole-body tasks (laboratory experience)",
-            # rad that matter: as much as everybody moves it anyway (`natural`).
-            least=0.05,
-        ),
-        Parameter(
-            "beyond",
-            "rad",
-            0.05,
-            "half the angle: where the joint lies and what hangs on it is known to a half",
-        ),
+    parameters = angle_and_beyond(
+        0.10,
+        "5-15 deg rms of head movement in whole-body tasks (laboratory experience)",
+        # rad that matter: as much as everybody moves it anyway (`natural`).
+        least=0.05,
     )
     separated_by = "Nodding and turning the head alone, standing still."
     advice = "Accept a body with a neck, or ask the person to look at one point straight ahead."
@@ -57,7 +45,7 @@ class HeadJoint(MissingJoint):
         """
         body, places = case.body, neck_and_vertex(case.body)
         seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
-        if places is None or len(seen) < _MARKERS or "head" in body.links:
+        if places is None or len(seen) < 3 or "head" in body.links:
             return None
         neck, vertex = places
         head = share_of_body(body, "head", top=vertex, bottom=neck)

@@ -1,6 +1,4 @@
-"""A joint turns about another point than the model's: regressions, functional trials and palpation miss joint centres
-by centimetres.
-"""
+"""A joint turns about another point than the model's."""
 
 from dataclasses import replace
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, axis_vector
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.records import Array
 
@@ -49,7 +49,7 @@ class LabTilt(Effect):
         with it.
         """
         # Gravity turned by a small angle about the axis: g + axis x g.
-        turned = np.cross(axis_vector(self.target), case.body.gravity)
+        turned = np.cross(np.eye(3)["xyz".index(self.target)], case.body.gravity)
         table = case.body.link_parameters(case.phi).reshape(-1, 10)
         move = case.segments
         # sum over segments n of R h + m p: first moment about the lab origin.

@@ -1,6 +1,4 @@
-"""Two markers carry each other's names: left and right, front and back of the wrist, for a whole session, from one
-trial on, or for a part of a trial.
-"""
+"""Two markers carry each other's names, for a session, from one trial on, or for a part of a trial."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -78,25 +76,16 @@ def named_exchanges(session: Session, found: Mapping[str, Mapping[Pair, Spans]])
     alike: dict[tuple[str, ...], list[Pair]] = {}
     for pair, where in sorted(places.items()):
         alike.setdefault(where, []).append(pair)
-    return tuple(
-        QualityCheck(
-            _CHECK,
-            False,
-            _sentence(pairs, where),
-            LabelsSwapped.name,
-            "/".join(pair),
-            advice=LabelsSwapped.advice,
-            trials=() if names[pair] == looked else names[pair],
-        )
-        for where, pairs in alike.items()
-        for pair in pairs
-    )
-
-
-def _sentence(pairs: list[Pair], places: tuple[str, ...]) -> str:
-    """Return what is exchanged and where, as one sentence for all ``pairs``."""
-    named = [f"{a} and {b}" for a, b in pairs]
-    return f"{', '.join(named)}{' each' if len(pairs) > 1 else ''} carry each other's names in {', '.join(places)}."
+    checks = []
+    for where, pairs in alike.items():
+        each = " each" if len(pairs) > 1 else ""
+        named = ", ".join(f"{a} and {b}" for a, b in pairs)
+        text = f"{named}{each} carry each other's names in {', '.join(where)}."
+        for pair in pairs:
+            effect, advice = LabelsSwapped.name, LabelsSwapped.advice
+            those = () if names[pair] == looked else names[pair]
+            checks.append(QualityCheck(_CHECK, False, text, effect, "/".join(pair), advice=advice, trials=those))
+    return tuple(checks)
 
 
 def exchanges(recorded: Recorded) -> dict[str, dict[Pair, Spans]]:
@@ -135,9 +124,7 @@ def refuted(body: Body, trial: Trial, pairs: Mapping[Pair, Spans]) -> bool:
 
 
 def _far(body: Body, markers: Markers, frames: Index) -> float:
-    """Return the mean square distance (m²) of some frames' markers to the body; infinite where they do not determine
-    it.
-    """
+    """Return the mean square distance (m²) of some frames' markers to the body; infinite if they leave it open."""
     try:
         found = solve_ik(body, Markers(markers.names, markers.time[frames], markers.xyz[frames]), tolerance=_ROUGH)
     except BiodanceError:

@@ -69,11 +69,12 @@ def lines(trial: Trial) -> dict[tuple[str, float], float]:
     """
     found = {}
     for plate in trial.plates:
-        if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
-            continue
+        rate = plate.wrench.rate
+        if not (rate > 2 * (max(MAINS) + 10) and plate.wrench.time.size > _SECONDS * rate):
+            continue  # it cannot show 60 Hz and its neighbours
         channels = wrench_about_point(plate.wrench.value, plate.centre)
         for frequency in MAINS:
-            amplitude, beside = line(channels, plate.wrench.rate, frequency)
+            amplitude, beside = line(channels, rate, frequency)
             for k, name in enumerate(CHANNELS):
                 target = name if len(trial.plates) == 1 else f"{plate.name}:{name}"
                 found[target, frequency] = float(amplitude[k]) if amplitude[k] > _CLEARLY * beside[k] else 0.0
@@ -93,11 +94,6 @@ def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
     # Half the width of a line under this window: two bins.
     own = away < _WANDERS + 2 * rate / len(values)
     return spectrum[own].max(axis=0), spectrum[~own & (away < _BESIDE)].max(axis=0)
-
-
-def _fast_enough(rate: float, samples: int) -> bool:
-    """Return whether a recording can show 60 Hz and its neighbours."""
-    return rate > 2 * (max(MAINS) + 10) and samples > _SECONDS * rate
 
 
 EFFECT = MainsHum

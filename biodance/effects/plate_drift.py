@@ -6,10 +6,6 @@ from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.effects.plate_offset import PlateOffset
 from biodance.records import Array
 
-_LEAST = {"N": 2.0, "N·m": 1.0}
-"""N, N·m that matter: what a spot check before a session tolerates (2 N are 0.3 % of an adult's weight, 1 N·m is
-1.4 mm of its centre of pressure)."""
-
 
 class PlateDrift(ChannelEffect):
     """A ``drift`` (N or N·m over the whole session) about the plate's centre in channel ``target``, zero in the
@@ -23,7 +19,7 @@ class PlateDrift(ChannelEffect):
             "N or N·m",
             3.0,
             "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)",
-            least=_LEAST,
+            least=PlateOffset.parameters[0].least,
         ),
     )
     grows = PlateOffset

@@ -43,10 +43,7 @@ plate reads.
 
 @dataclass(frozen=True)
 class _Carried:
-    """``ratio`` of the mean vertical force that all plates carry to the one that the movement needs; ``off`` m, how far
-    to the left of where it should be its place lies; by plate, the ``gain`` of all its channels that would explain the
-    ratio, and how far off the place would be without it.
-    """
+    """Force on all plates over the need, how far left its place is (m), and by plate the gain that explains it."""
 
     ratio: float
     off: float
@@ -165,9 +162,7 @@ class PlateGain(InstalledPlate):
     def _reads(
         cls, found: Mapping[str, _Carried], usual: float, sd: float, trials: tuple[str, ...]
     ) -> QualityCheck | None:
-        """Return the plate whose gain explains what is carried in ``trials`` (() = all), if one does and better than a
-        wrong mass.
-        """
+        """Return the plate whose gain explains ``trials`` (() = all) better than a wrong mass, if one does."""
 
         def apart(off: list[float]) -> float:
             # Squared deviation of the place of pressure, in standard deviations: chi-square of

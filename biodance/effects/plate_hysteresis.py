@@ -1,6 +1,4 @@
-"""A force plate does not forget: after loading it reads less than after unloading to the same load (friction, glue, a
-loose top plate).
-"""
+"""A force plate does not forget: after loading it reads less than after unloading to the same load."""
 
 import numpy as np
 
@@ -57,9 +55,7 @@ class PlateHysteresis(ChannelEffect):
         return bool(0 < theta[0] <= _WIDEST * np.abs(self._load(case)).max())
 
     def _load(self, case: Case) -> Array:
-        """Return what the channel (T,) read about the plate's centre: in double support no prediction has one plate's
-        part of it.
-        """
+        """Return what the channel (T,) read about the plate's centre: no prediction has one plate's part of it."""
         plate = self.plate_of(case)
         return wrench_about_point(plate.wrench.value, plate.centre)[:, self.channel]
 

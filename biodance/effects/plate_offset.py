@@ -112,9 +112,7 @@ class PlateOffset(ChannelEffect):
 
 
 def _zeros(session: Session) -> dict[str, dict[str, tuple[float, bool]]]:
-    """Return by target (``Fy``, ``plate1:Fy``) and trial what an empty plate reads (N), and whether it is still in the
-    record: what the reader took off is a zero, too.
-    """
+    """Return by target and trial what an empty plate reads (N), and whether it is still in the record."""
     found: dict[str, dict[str, tuple[float, bool]]] = {}
     single = all(len(trial.plates) < 2 for trial in session.trials)
     for trial in session.trials:

@@ -64,14 +64,14 @@ class PlatesExchanged(DiscreteEffect):
                 where.setdefault(pair, []).append(name)
         if told and not where:
             return (QualityCheck("channels of the plates", True, "No two plates carry each other's channels."),)
-        return tuple(cls._found(pair, names, [n for n in told if pair in told[n]]) for pair, names in where.items())
-
-    @classmethod
-    def _found(cls, pair: _Pair, names: list[str], telling: list[str]) -> QualityCheck:
-        text = f"The pressures of {pair[0]} and {pair[1]} lie under the feet only once their channels are exchanged"
-        trials = () if names == telling else tuple(names)
-        text += f", in {', '.join(names)}." if trials else "."
-        return QualityCheck("channels of the plates", False, text, cls.name, "/".join(pair), trials=trials)
+        failed = []
+        for pair, names in where.items():
+            trials = () if names == [name for name in told if pair in told[name]] else tuple(names)
+            text = f"The pressures of {pair[0]} and {pair[1]} lie under the feet only once their channels are exchanged"
+            text += f", in {', '.join(names)}." if trials else "."
+            check = QualityCheck("channels of the plates", False, text, cls.name, "/".join(pair), trials=trials)
+            failed.append(check)
+        return tuple(failed)
 
     @classmethod
     def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
@@ -113,9 +113,7 @@ def _axes(plate: Plate) -> Array:
 
 
 def _pairs(trial: Trial) -> dict[_Pair, bool]:
-    """Return for every two plates of a trial whose pressures are known whether they are exchanged; {} where the feet
-    are not seen.
-    """
+    """Return for every two plates whose pressures are known whether they are exchanged; {} without feet."""
     if trial.markers is None or not trial.marker_set or sum(plate.placed for plate in trial.plates) < 2:
         return {}
     try:

@@ -1,6 +1,4 @@
-"""A segment is longer than the model's: typed measures, a body scaled on another day, shoes that came or went since
-the static trial.
-"""
+"""A segment is longer than the model's."""
 
 from dataclasses import replace
 

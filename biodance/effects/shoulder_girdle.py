@@ -6,8 +6,7 @@ from biodance.body.body import Body
 from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import shoulders, sternoclavicular
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint, doubting
+from biodance.effects._base.missing_joint import MissingJoint, angle_and_beyond, doubting
 from biodance.effects._base.words import About, CauseWords, CheckKind
 
 SHOULDERS = ("RSHO", "LSHO")
@@ -22,21 +21,11 @@ class ShoulderGirdle(MissingJoint):
     """
 
     name = "shoulder_girdle"
-    parameters = (
-        Parameter(
-            "angle",
-            "rad",
-            0.10,
-            "2-5 cm of the shoulder joint on the thorax (laboratory experience)",
-            # rad that matter: as much as everybody moves it anyway (`natural`).
-            least=0.06,
-        ),
-        Parameter(
-            "beyond",
-            "rad",
-            0.05,
-            "half the angle: where the joint lies and what hangs on it is known to a half",
-        ),
+    parameters = angle_and_beyond(
+        0.10,
+        "2-5 cm of the shoulder joint on the thorax (laboratory experience)",
+        # rad that matter: as much as everybody moves it anyway (`natural`).
+        least=0.06,
     )
     separated_by = "Shrugging alone, with hanging arms."
     advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."

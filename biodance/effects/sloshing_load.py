@@ -75,10 +75,6 @@ class SloshingLoad(Effect):
         rigid, sloshing = self._parts(case, _frequency(theta), float(theta[3]))
         return np.asarray(theta[0] * rigid + theta[1] * sloshing)
 
-    def transform(self, case: Case, theta: Array) -> Case:
-        """Return the case whose plates also carry the load."""
-        return case.with_added(self.plate_of(case), self.added(case, theta))
-
     def _parts(self, case: Case, frequency: float, high: float) -> tuple[Array, Array]:
         """Return the wrenches (T, 6) per kilogram carried and per kilogram that sloshes."""
         index = case.body.segment_index(self.target)

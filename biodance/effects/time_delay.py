@@ -82,7 +82,12 @@ class TimeDelay(Effect):
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the delays that Newton shows and that are too large for statistics: one of all trials, or of some."""
         told = {name: one for name, one in recorded.newton.items() if np.isfinite(one.lag)}
-        late = {name: one for name, one in told.items() if _is_late(one)}
+        # So late that gates hide it; the lag explains most of what none leaves: 1 - r² at it over 1 - r² at none.
+        late = {
+            name: one
+            for name, one in told.items()
+            if abs(one.lag) > _LARGE and 1 - one.correlation**2 < _EXPLAINS * (1 - one.unmoved**2)
+        }
         lags = [one.lag for one in late.values()]
         if not told:
             return ()
@@ -108,12 +113,6 @@ class TimeDelay(Effect):
         """Return the trial with its forces moved to their instant: their times are."""
         plates = tuple(replace(p, wrench=Wrench(p.wrench.time - found.size, p.wrench.value)) for p in trial.plates)
         return replace(trial, plates=plates)
-
-
-def _is_late(one: LagAndMass) -> bool:
-    """Return whether the forces come so late that gates hide it, and clearly go with the trunk only then."""
-    # The lag must explain most of what no lag leaves: 1 - r² at it over 1 - r² at none.
-    return bool(abs(one.lag) > _LARGE and 1 - one.correlation**2 < _EXPLAINS * (1 - one.unmoved**2))
 
 
 EFFECT = TimeDelay

@@ -6,8 +6,7 @@ from biodance.body.body import Body
 from biodance.body.changes import Cut, with_part
 from biodance.body.human.skeleton import share_of_body, shoulders
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint, doubting
+from biodance.effects._base.missing_joint import MissingJoint, angle_and_beyond, doubting
 from biodance.effects._base.words import About, CauseWords, CheckKind
 
 XIPHION = 0.61
@@ -19,7 +18,6 @@ _PLACE = 0.25
 supple part of the back.
 """
 _AXES = {"thorax_flexion": -np.eye(3)[2], "thorax_bending": np.eye(3)[0]}
-_MARKERS = 4
 
 ELSEWHERE = ("HD", "SHO", "UPA", "ELB", "FRM", "WRA", "WRB", "FIN")
 """Markers that follow the neck, the shoulder blades and the arms as well as the thorax."""
@@ -31,21 +29,11 @@ class TrunkJoint(MissingJoint):
     """
 
     name = "trunk_joint"
-    parameters = (
-        Parameter(
-            "angle",
-            "rad",
-            0.06,
-            "5-10 deg rms between lumbar and thoracic spine (laboratory experience)",
-            # rad that matter: as much as everybody moves it anyway (`natural`).
-            least=0.05,
-        ),
-        Parameter(
-            "beyond",
-            "rad",
-            0.03,
-            "half the angle: where the joint lies and what hangs on it is known to a half",
-        ),
+    parameters = angle_and_beyond(
+        0.06,
+        "5-10 deg rms between lumbar and thoracic spine (laboratory experience)",
+        # rad that matter: as much as everybody moves it anyway (`natural`).
+        least=0.05,
     )
     separated_by = "Rounding and arching the back alone, standing still."
     advice = "Accept a body with a thorax, and put two more markers on the loins (L1, L3)."
@@ -77,7 +65,7 @@ class TrunkJoint(MissingJoint):
             return None
         index = body.segment_index("trunk_head")
         on = tuple(name for name, s in zip(body.markers.names, body.markers.segment, strict=True) if s == index)
-        if sum(body.markers.segment[c] == index for c in case.marker_columns) < _MARKERS:
+        if sum(body.markers.segment[c] == index for c in case.marker_columns) < 4:
             return None
         place = _PLACE * middle
         loins = _PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))

@@ -68,11 +68,8 @@ class UnequalLimbs(Effect):
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return the first segments of a leg that may be lighter, of bodies that have both sides."""
         names = case.body.segments
-        return tuple(f"{side}_{end}" for end in _ENDS for side in ("right", "left") if _both(names, end))
-
-    def transform(self, case: Case, theta: Array) -> Case:
-        """Return the case that somebody with that limb would have recorded (the first plate takes it of several)."""
-        return case.with_added(case.trial.plates[0], self.added(case, theta))
+        both = (end for end in _ENDS if {f"right_{end}", f"left_{end}"} <= set(names))
+        return tuple(f"{side}_{end}" for end in both for side in ("right", "left"))
 
     def added(self, case: Case, theta: Array) -> Array:
         """Return (T, 6) the wrench that the missing matter does not need, and the rest of the body needs more."""
@@ -117,10 +114,6 @@ class UnequalLimbs(Effect):
         middle = mass @ pose.points(limb, part[:, 1:4] / mass[:, None])[0] / mass.sum()
         nearest = -float(np.linalg.norm(middle - pose.position[0, limb[0]]))
         return bool(0 < theta[0] < mass.sum() and nearest < theta[2] < _FARTHEST)
-
-
-def _both(names: tuple[str, ...], end: str) -> bool:
-    return {f"right_{end}", f"left_{end}"} <= set(names)
 
 
 EFFECT = UnequalLimbs

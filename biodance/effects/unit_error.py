@@ -70,19 +70,18 @@ class UnitError(DiscreteEffect):
         ratios = {name: ratio for name, ratio in found if ratio is not None}
         if not ratios:
             return ()
-        middle, carried = float(np.median(list(ratios.values()))), _carried(ratios)
+        middle = float(np.median(list(ratios.values())))
+        # In which trials least and most.
+        ends = dict.fromkeys((min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)))
+        words = " to ".join(f"{float(f'{ratios[name]:.3g}'):g} ({name})" for name in ends)
+        carried = (
+            f"The plates carry {words} times the declared weight (median of a trial while loaded, movement included)"
+        )
         for factor, meaning in FACTORS.items():
             if abs(middle / factor - 1) < _NEAR:
                 said = f"{carried}: {meaning}."
                 return (QualityCheck("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
         return (QualityCheck("weight on the plates", True, f"{carried}: no unit is mistaken."),)
-
-
-def _carried(ratios: dict[str, float]) -> str:
-    """Return what the plates carry of the declared weight, and in which trials least and most."""
-    ends = dict.fromkeys((min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)))
-    words = " to ".join(f"{float(f'{ratios[name]:.3g}'):g} ({name})" for name in ends)
-    return f"The plates carry {words} times the declared weight (median of a trial while loaded, movement included)"
 
 
 def weight_ratio(trial: Trial, mass: float) -> float | None:

@@ -7,7 +7,7 @@ from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, R
 from biodance.effects._base.words import About, CauseWords
 from biodance.motion.contact import ground_contact, share_lacking
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, LeftOut, Mask
+from biodance.records import Array, LeftOut
 from biodance.settings import STANDARD_GRAVITY
 
 _HELD = ("pelvis", "left_forearm_hand", "right_forearm_hand")
@@ -50,7 +50,10 @@ class UnmeasuredContact(DiscreteEffect):
             when = contact.left_out.get(LeftOut.CARRIED_ELSEWHERE)
             if when is not None:
                 size = float(np.percentile(weight * share_lacking(case.trial, weight=weight)[when], _LARGEST))
-                found.setdefault(_stillest(case, when), {})[case.trial.name] = size
+                speeds = {name: _speed(case, name)[when].mean() for name in _HELD if name in case.body.segments}
+                # Of the segments that can be carried, the one that moves least.
+                stillest = min(speeds, key=lambda name: speeds[name], default=_HELD[0])
+                found.setdefault(stillest, {})[case.trial.name] = size
         what = "contact beside the plates"
         if not found:
             return (QualityCheck(what, True, "Nothing beside the plates carries the person."),) if cases else ()
@@ -68,12 +71,6 @@ def _said(segment: str, sizes: dict[str, float]) -> str:
         f"Something that no plate measures carries up to {sizes[heaviest] / STANDARD_GRAVITY:.0f} kg at the "
         f"{segment.replace('_', ' ')}, in {', '.join(sizes)} (most in {heaviest})."
     )
-
-
-def _stillest(case: Case, when: Mask) -> str:
-    """Return which of the segments that can be carried moves least in the frames ``when`` (T,), by its markers."""
-    speeds = {segment: _speed(case, segment)[when].mean() for segment in _HELD if segment in case.body.segments}
-    return min(speeds, key=lambda segment: speeds[segment], default=_HELD[0])
 
 
 def _speed(case: Case, segment: str) -> Array:

@@ -9,7 +9,7 @@ from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, R
 from biodance.effects._base.words import About, CauseWords
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit, believable, standing_point
-from biodance.motion.newton import TELLS, LagAndMass, trunk_of
+from biodance.motion.newton import TELLS, trunk_of
 from biodance.records import Trial
 
 _MOST = 0.5
@@ -48,10 +48,10 @@ class UnrelatedForces(DiscreteEffect):
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the trials of which the force gate leaves out most, and whose force goes with no movement."""
-        told = [
-            (case, recorded.newton[case.trial.name]) for case in recorded.cases if case.trial.name in recorded.newton
-        ]
-        lost = {case.trial.name: share for case, one in told if _strange(one) and (share := _left_out(case)) > _MOST}
+        names, newton = [case.trial.name for case in recorded.cases], recorded.newton
+        told = [(case, newton[name]) for case, name in zip(recorded.cases, names, strict=True) if name in newton]
+        strange = [case for case, one in told if one.swing > _MOVES and one.correlation < TELLS]
+        lost = {case.trial.name: share for case in strange if (share := _left_out(case)) > _MOST}
         if told and not lost:
             text = "The forces of every trial that tells belong to its movement."
             return (QualityCheck("forces and movement", True, text),)
@@ -73,14 +73,8 @@ class UnrelatedForces(DiscreteEffect):
         return replace(trial, plates=())
 
 
-def _strange(one: LagAndMass) -> bool:
-    return bool(one.swing > _MOVES and one.correlation < TELLS)
-
-
 def _left_out(case: Case) -> float:
-    """Return the share of the frames on plates that table and plates differ too much in to be believed; 0 where the
-    plates nearly always show too little: then something beside them carries.
-    """
+    """Return the share of frames on plates that cannot be believed; 0 where plates nearly always lack force."""
     trunk = trunk_of(case.trial, mass=float(case.phi[::10].sum()))
     use = np.asarray(np.isfinite(case.residual).all(axis=1))
     if trunk is not None and trunk.covered.size == use.size:

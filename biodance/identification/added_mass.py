@@ -403,9 +403,7 @@ def added_mass(
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """One explanation of the body: ``log_prior``, ``log_none`` (with the evidence of the data without load) and what it
-    lets see of a load on each segment.
-    """
+    """One explanation of the body, with what it lets see of a load on each segment."""
 
     log_prior: float
     log_none: float

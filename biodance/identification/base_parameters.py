@@ -45,16 +45,6 @@ class BaseParameters:
         """Number of base parameters."""
         return len(self.columns)
 
-    @property
-    def static(self) -> tuple[int, ...]:
-        """Positions (in the base set) of masses and first moments."""
-        return tuple(i for i, c in enumerate(self.columns) if c % 10 < 4)
-
-    @property
-    def dynamic(self) -> tuple[int, ...]:
-        """Positions (in the base set) of inertias."""
-        return tuple(i for i, c in enumerate(self.columns) if c % 10 >= 4)
-
     def relations(self) -> tuple[str, ...]:
         """Return the regrouping relations as text, one per base parameter (paper eq. 13)."""
         lines = []

@@ -14,7 +14,7 @@ whole body: mass and place of every segment there are open, the rest of the body
 ties them to the other side.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -204,14 +204,6 @@ def with_sides(table: Sip, *, apart: bool) -> Sip:
     return replace(table, covariance=covariance)
 
 
-def _has_open_limb(table: Sip) -> bool:
-    """Return whether one limb of the table is open (`limbs.with_open_limb`): that is how the sides differ."""
-    spread = dict(
-        zip(table.segments, np.diag(table.covariance)[::10] / np.maximum(table.mass, 1e-12) ** 2, strict=True)
-    )
-    return any(spread[name] > _OPEN * spread.get(other_side(name), np.inf) for name in spread)
-
-
 PossibleTables = Mapping[tuple[bool, bool], Sip]
 """What may be known before the data, by whether the trunk's matter lies along with the joint, and the sides are
 apart."""
@@ -224,7 +216,11 @@ def possible_tables(table: Sip, body: Body) -> PossibleTables:
     placed = {False: table}
     if body.at_joint is not None:
         placed = {along: _at(body, float(table.mass.sum()), along=along) for along in (False, True)}
-    sides = (False,) if _has_open_limb(table) else (False, True)
+    shares = np.diag(table.covariance)[::10] / np.maximum(table.mass, 1e-12) ** 2
+    spread = dict(zip(table.segments, shares, strict=True))
+    # An open limb (`with_open_limb`) is how the sides differ.
+    is_open = any(spread[name] > _OPEN * spread.get(other_side(name), np.inf) for name in spread)
+    sides = (False,) if is_open else (False, True)
     return {(x, s): with_sides(one, apart=True) if s else one for x, one in placed.items() for s in sides}
 
 
@@ -281,23 +277,28 @@ def with_open_limb(body: Body, segment: str) -> Body:
     """Return ``body`` whose limb from ``segment`` on is a prosthesis: the masses there known to the share
     `unequal_limb mass`, and their places to `unequal_limb place`.
     """
-    place = None if body.at_joint is None else _opened(body, body.at_joint, segment)
-    return replace(body, sip=_opened(body, body.sip, segment), at_joint=place)
-
-
-def _opened(body: Body, table: Sip, segment: str) -> Sip:
-    covariance, limb = np.array(table.covariance), segments_beyond(body, segment)
     share, way = error_size("unequal_limb", "mass"), error_size("unequal_limb", "place")
-    rest = table.phi * ~np.repeat(np.isin(np.arange(len(body.segments)), limb), 10)
-    for index in limb:
-        own = slice(10 * index, 10 * index + 10)
-        # The segment heavier by a share of itself, the rest of the body lighter by as much: total unchanged.
-        less = -table.phi[10 * index] * rest / rest[::10].sum()
-        less[own] = table.phi[own]
-        covariance += share**2 * np.outer(less, less)
-        slope = way * shift_slope(table.phi[own])
-        covariance[own, own] += slope @ slope.T
-    return replace(table, covariance=covariance)
+    limb = segments_beyond(body, segment)
+
+    def opened(table: Sip) -> Sip:
+        covariance = np.array(table.covariance)
+        rest = table.phi * ~np.repeat(np.isin(np.arange(len(body.segments)), limb), 10)
+        for index in limb:
+            own = slice(10 * index, 10 * index + 10)
+            # The segment heavier by a share of itself, the rest of the body lighter by as much: total unchanged.
+            less = -table.phi[10 * index] * rest / rest[::10].sum()
+            less[own] = table.phi[own]
+            covariance += share**2 * np.outer(less, less)
+            slope = way * shift_slope(table.phi[own])
+            covariance[own, own] += slope @ slope.T
+        return replace(table, covariance=covariance)
+
+    return _with_tables(body, opened)
+
+
+def _with_tables(body: Body, changed: Callable[[Sip], Sip]) -> Body:
+    """Return ``body`` with both of its tables ``changed``: at the table's cut, and along with the joint."""
+    return replace(body, sip=changed(body.sip), at_joint=None if body.at_joint is None else changed(body.at_joint))
 
 
 def with_devices(body: Body, worn: Mapping[str, float]) -> Body:
@@ -307,22 +308,21 @@ def with_devices(body: Body, worn: Mapping[str, float]) -> Body:
     carried = sum(worn.values())
     if not carried:
         return body
-    place = None if body.at_joint is None else _wearing(body, body.at_joint, worn, carried)
-    return replace(body, sip=_wearing(body, body.sip, worn, carried), at_joint=place)
 
+    def wearing(table: Sip) -> Sip:
+        # The person without what is worn: lighter in proportion, covariance with the square.
+        ratio = 1 - carried / float(table.mass.sum())
+        phi, covariance = ratio * table.phi, ratio**2 * np.asarray(table.covariance)
+        for segment, mass in worn.items():
+            index = body.segment_index(segment)
+            own = slice(10 * index, 10 * index + 10)
+            mean, factor = unit_load(body, index)
+            phi[own] += mass * mean
+            # A load of m kg: mean m u, covariance m² G G'.
+            covariance[own, own] += mass**2 * factor @ factor.T
+        return replace(table, phi=phi, covariance=covariance)
 
-def _wearing(body: Body, table: Sip, worn: Mapping[str, float], carried: float) -> Sip:
-    # The person without what is worn: lighter in proportion, covariance with the square.
-    ratio = 1 - carried / float(table.mass.sum())
-    phi, covariance = ratio * table.phi, ratio**2 * np.asarray(table.covariance)
-    for segment, mass in worn.items():
-        index = body.segment_index(segment)
-        own = slice(10 * index, 10 * index + 10)
-        mean, factor = unit_load(body, index)
-        phi[own] += mass * mean
-        # A load of m kg: mean m u, covariance m² G G'.
-        covariance[own, own] += mass**2 * factor @ factor.T
-    return replace(table, phi=phi, covariance=covariance)
+    return _with_tables(body, wearing)
 
 
 def with_declared_limbs(body: Body, subject: Subject) -> tuple[Body, str]:

@@ -151,9 +151,7 @@ def solve_convex(problem: "cp.Problem") -> str:
 
 
 def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array | None, str]:
-    """Solve eq. 8 in centred coordinates x = U (phi - centre), where the objective is |x|²; return phi and the
-    solver's word.
-    """
+    """Solve eq. 8 in coordinates x in which the objective is |x|²; return phi and the solver's word."""
     import cvxpy as cp
 
     count = data.triangle.shape[1]

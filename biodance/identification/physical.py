@@ -122,24 +122,18 @@ def physical_fit(posterior: BodyPosterior, body: "Body") -> PhysicalFit | Failed
         bound = bound | outside
         x, word = _nearest(posterior, limits, np.flatnonzero(bound))
         if x is None:
-            return FailedFit(_cause(word, [name for name, acts in zip(prior.segments, bound, strict=True) if acts]))
+            held = ", ".join(name for name, acts in zip(prior.segments, bound, strict=True) if acts)
+            return FailedFit(
+                f"No possible body was found near what the data say (solver: {word}; segments {held}): the data "
+                "contradict every body that fits the boxes. Check the scaling, the declared mass and the force plates."
+            )
         phi, distance = posterior.mean + posterior.factor @ x, float(np.linalg.norm(x))
     return PhysicalFit(Sip(prior.segments, phi, posterior.covariance), bound & (limits.room(phi) < 10 * GAP), distance)
 
 
-def _cause(word: str, segments: list[str]) -> str:
-    return (
-        f"No possible body was found near what the data say (solver: {word}; segments {', '.join(segments)}): the "
-        f"data contradict every "
-        "body that fits the boxes. Check the scaling, the declared mass and the force plates."
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class _Limits:
-    """What N segments may be, in units of each: ``cone`` (N, 16, 10) maps ten parameters to a matrix of at least
-    ``floor`` (N, 4, 4); ``sides`` (N, 6, 10) to distances inside the CoM's box, m.
-    """
+    """What N segments may be: ``cone`` (N, 16, 10) phi of at least ``floor``, ``sides`` (N, 6, 10) phi not negative."""
 
     cone: Array
     floor: Array
@@ -196,9 +190,7 @@ def _nearest(posterior: BodyPosterior, limits: _Limits, bound: NDArray[np.intp])
 
 
 def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
-    """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the
-    solver's word.
-    """
+    """Return the smallest z for which mean + local z of segments ``bound`` is inside limits, and the solver's word."""
     matrices, sides, levels = [], [], []
     for k, i in enumerate(bound):
         slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
@@ -215,11 +207,7 @@ def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) 
 
 
 def _free_axes(matrices: Array) -> Array:
-    """Return the axes (r, 4) along which any of the pseudo-inertias ``matrices`` (16, k) has something.
-
-    Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and
-    needs no limit.
-    """
+    """Return the axes (r, 4) along which ``matrices`` (16, k) have something: along others a rod or plate is thin."""
     # The (16, k) matrices below each other as rows of length 4: right singular vectors are the axes they act on.
     _, size, axes = np.linalg.svd(matrices.T.reshape(-1, 4))
     return np.asarray(axes[size > _NOTHING * size.max()])

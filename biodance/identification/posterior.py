@@ -57,10 +57,6 @@ class Information:
         """Whitened sum of squares that no parameter can explain."""
         return float(self.R[-1, -1] ** 2)
 
-    def cost(self, phi: Array) -> float:
-        """Return the whitened sum of squared residuals at parameters ``phi`` (p,)."""
-        return float(np.sum((self.triangle @ phi - self.target) ** 2)) + self.misfit
-
 
 def fold(rows: Array, onto: Array | None = None) -> Array:
     """Return the upper triangle (n, n) of the QR factorisation of ``onto`` stacked over ``rows`` (m, n)."""

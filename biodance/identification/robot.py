@@ -33,7 +33,6 @@ _BANDS = Bands((0.0, 0.04, 0.3, 1.0, 2.5), 25.0)
 explain it come out small (regression dilution): with 6 Hz a robot of 7.36 kg in MuJoCo was found 70 g light and its
 inertias were further from the truth than the drawing's, with 2.5 Hz it is found within 7 g.
 """
-_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +88,11 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
 
 
 def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BaseParameters) -> BaseEstimate:
-    """Return the base parameters by weighted least squares on frames that count as independent (paper eq. 7), no prior:
-    sigma from what the fit itself leaves of every channel and (W' W)^-1.
-    """
+    """Return the base parameters by weighted least squares on independent frames, no prior (paper eq. 7)."""
     layout = Noise.unit(about, WHITE)
     total = statistics(body, fits, layout)
     noise, phi = replace(layout, covariance=robot_start(body)[None]), np.zeros(10 * len(body.segments))
-    for _ in range(_ROUNDS):
+    for _ in range(4):
         found = estimate_base(total.information(noise), base)
         phi[list(base.columns)] = found.value
         left = total.moments(phi, np.zeros((phi.size, phi.size))).residual[0]
@@ -116,7 +113,9 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
     places = []
     for fit, one in trials:
         place = np.zeros((size, places_of(one.grounded)))
-        changes = zero_changes(body, one.grounded, one.angle)
+        # `ZERO` rad at every joint's encoder.
+        zeros = np.broadcast_to(ZERO * np.eye(one.angle.shape[1]), (*one.angle.shape, one.angle.shape[1]))
+        changes = angle_changes(body, one.grounded, one.angle, zeros)
         white = noise.at(fit.motion.rate)
         for _, pick in long_runs((fit,), noise.bands):
             motion = fit.motion.at(pick)
@@ -151,15 +150,6 @@ _SLOW = 0.3
 """Cut-off over the thinned rate: changes are smooth."""
 THINNED = 4
 """Every so many frames are enough to see what an encoder's zero does."""
-
-
-def zero_changes(body: Body, one: Grounded, angle: Array) -> Array:
-    """Return the change (T / `THINNED`, 6, n) of the needed wrench by `ZERO` rad at every joint's encoder, of a motion
-    with joint ``angle`` (T, n) rad.
-    """
-    return angle_changes(
-        body, one, angle, np.broadcast_to(ZERO * np.eye(angle.shape[1]), (*angle.shape, angle.shape[1]))
-    )
 
 
 def leg_chains(body: Body) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -228,9 +218,7 @@ def slow_wrench(body: Body, one: Grounded, angle: Array) -> Array:
 
 
 def _needed(body: Body, motion: Motion) -> Array:
-    """Return the wrench (T, 6) that a motion needs, about the origin; one vector at a time, ten times faster than by
-    the regressor.
-    """
+    """Return the wrench (T, 6) that a motion needs about the origin, ten times faster than by the regressor."""
     pin = load_pinocchio()
     model, rows = body.model, np.empty((motion.time.size, 6))
     data = model.createData()

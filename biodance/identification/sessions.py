@@ -95,11 +95,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
 
 
 def _prior_influence(posterior: BodyPosterior) -> Array:
-    """Return A (p, p) = C P^-1 of a posterior with covariance C: what of a step of the prior's mean is still in its
-    mean.
-
-    In the units of each parameter's own standard deviation, where the inverse hangs on no rounding.
-    """
+    """Return A (p, p) = C P^-1 of a posterior with covariance C: what of a step of the prior's mean it keeps."""
     scale = np.sqrt(np.diag(posterior.prior.covariance))
     unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
     inverse = np.linalg.pinv(posterior.prior.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
@@ -115,9 +111,7 @@ def _possible(posterior: BodyPosterior, one: Identification) -> Array:
 
 
 def _with_room(table: Sip, one: Identification, other: Identification) -> BodyPosterior:
-    """Return the posterior of session ``one`` after its ``table`` with room for the loads that it carries beyond
-    ``other``.
-    """
+    """Return the posterior of session ``one`` after its ``table`` with room for loads that it has beyond ``other``."""
     chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
     share = np.array([chance[segment] for segment in one.body.segments])
     return find_posterior(one.data, with_room(table, unknown_loads(one.body, share=share)))

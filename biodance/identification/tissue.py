@@ -124,9 +124,7 @@ def _readings(tissue: Tissue) -> TissueReadings:
 
 
 def _sizes(source: ErrorSource, whole: Body, body: Body) -> Array:
-    """Return the standard deviations (K,) of a kind of errors of the ``whole`` body, in which parts of the ``body`` are
-    segments: these sag as what they are parts of.
-    """
+    """Return the standard deviations (K,) of a kind of errors of the ``whole`` body, parts as in ``body``."""
     if isinstance(source, Sag):
         return np.array([error_size(*of_whole(group, body).split(" ")) for group in source.groups])
     return deviations(whole, (source,))
@@ -137,9 +135,7 @@ def _functionals(sources: tuple[ErrorSource, ...], trial: Response) -> Array:
 
 
 def _rows(tissue: Tissue, whole: Body, layout: Noise) -> tuple[Array, NDArray[np.intp]]:
-    """Return the coefficients (n, 6, K + 1) of all errors of unit size and of what trials leave, with the band (n,) of
-    each; ``whole`` the body with its parts as segments.
-    """
+    """Return the coefficients (n, 6, K + 1) of all errors of unit size and of what trials leave, and their bands."""
     body, sources = tissue.body, sources_of(whole)
     found, bands = [np.zeros((0, 6, sum(len(source.groups) for source in sources) + 1))], [np.zeros(0, dtype=np.intp)]
     left = {
@@ -195,9 +191,7 @@ def _most_probable(data: Statistics, kind: NDArray[np.str_]) -> tuple[Array, dic
 
 
 def _scales(square: Array, count: Array, start: Array) -> Array:
-    """Return the logarithms l of the scales of kinds of ``count`` unknowns with the sum of squares ``square``: the
-    maximum of -count l - square exp(-2 l) / 2 - l² / (2 _SPREAD²), by Newton.
-    """
+    """Return the logarithms l that maximise -count l - square exp(-2 l) / 2 - l² / (2 _SPREAD²), by Newton."""
     scale = start
     for _ in range(_ROUNDS):
         told = square * np.exp(-2 * scale)

@@ -200,10 +200,7 @@ def impacts(found: Identification, motion: Motion, use: NDArray[np.bool_]) -> tu
 
 
 def _moved(found: Identification) -> tuple[Array, Array]:
-    """Return by how much the parameters move (10N, 10N) with one standard deviation of each quantity, and these (10N,).
-
-    Columns in the order of ``found.known``: segment by segment, in each the quantities of `QUANTITIES`.
-    """
+    """Return by how much parameters move (10N, 10N) per standard deviation of each of ``found.known``, and these."""
     C, size = found.posterior.covariance, len(QUANTITIES)
     slopes = np.zeros_like(C)
     for i in range(len(found.sip.segments)):

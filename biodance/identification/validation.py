@@ -119,9 +119,7 @@ def tissue_beside(found: Identification, fits: tuple[Fit, ...], body: Body, plat
 
 
 def _rows(found: Identification, used: tuple[Fit, ...], noise: Noise, softer: float) -> PlateRows:
-    """Return what the ``used`` trials tell of parameters and plates under a ``noise``, whatever the body; skin slides
-    ``softer`` times as much as the table says.
-    """
+    """Return what ``used`` trials tell of parameters and plates under a ``noise``, whatever the body."""
     rows = mismatch(found.body, used, noise, softer=softer, with_rows=True).rows
     assert rows is not None
     return rows

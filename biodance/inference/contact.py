@@ -5,14 +5,14 @@ Three of the six channels remain unconstrained by a force at one point, so that 
 keeps to one side of its main direction, and takes hold and lets go quickly: what swells and creeps back is none.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve
 
 from biodance.diagnosis.candidates import local_basis
-from biodance.effects import NamedCause, Transient
+from biodance.effects import Case, NamedCause, Transient
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
 from biodance.inference.scales import fit, posterior, prior_sd, products
@@ -37,9 +37,7 @@ _STEPS = 2
 
 @dataclass(frozen=True, eq=False)
 class _Touch:
-    """One contact: whitened unit columns ``Z`` (r, k), their ``score`` (k,) and ``information`` (k, k), its most
-    probable ``size`` and its ``log_bayes_factor`` there.
-    """
+    """One contact: whitened unit columns ``Z`` (r, k), ``score``, ``information``, and its most probable ``size``."""
 
     effect: Transient
     Z: Array
@@ -111,17 +109,12 @@ def _is_touch(rows: Rows, one: _Touch) -> bool:
     the body's weight take the mean of a trial from a foot, of where it lies most of the time in its trial, if it is
     quick.
     """
-    assert rows.problem is not None
     # Coefficients lie instant by instant, the parameters of one instant together.
-    values, beside, start = one.course.reshape(-1, len(one.effect.parameters)), [], 0
-    if one_sided(values):
+    count = len(one.effect.parameters)
+    if one_sided(one.course.reshape(-1, count)):
         return True
-    for case in rows.problem.cases:
-        columns = one.effect.local(case)
-        # columns (T, 6, k): k coefficients of this trial, so k / parameters instants.
-        stop = start + (0 if columns is None else columns.shape[2] // values.shape[1])
-        beside.append(values[start:stop] - (np.median(values[start:stop], axis=0) if stop > start else 0.0))
-        start = stop
+    by_trial = [part.reshape(-1, count) for part in _by_trial(rows, one.effect, one.course).values()]
+    beside = [part - np.median(part, axis=0) for part in by_trial]
     inner = [part[_END:-_END] for part in beside]  # nobody judges the ends of a trial: there the course is open
     return one_sided(np.concatenate(inner)) and quick(inner)
 
@@ -146,9 +139,7 @@ def one_sided(course: Array) -> bool:
 
 
 def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothesis:
-    """Return the hypothesis with the contact at the point of its segment that explains most, and its course there; as
-    its size the force while it acts: half of the squares of its values belong to larger ones.
-    """
+    """Return the hypothesis with the contact where its segment explains most; its size is the force while it acts."""
     rows, effect, Z = search.rows, *_placed(search, base, one)
     own = np.concatenate([base.Z, one.size * Z], axis=1)
     columns, sd, sure, touched = search.columns, prior_sd(rows), base.sure, base
@@ -178,23 +169,23 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     return replace(touched, causes=causes, log_posterior=value)
 
 
+def _in_trials(rows: Rows, effect: Transient) -> Iterator[tuple[Case, Array]]:
+    """Yield every trial with the columns (T, 6, k) of a contact that comes and goes in it (`_columns`)."""
+    for case in rows.problem.cases if rows.problem else ():
+        columns = effect.local(case)
+        assert columns is not None
+        yield case, columns
+
+
 def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:
     """Return the ``course`` (k,) cut by trials."""
-    assert rows.problem is not None
-    parts, start = {}, 0
-    for case in rows.problem.cases:
-        columns = effect.local(case)
-        width = 0 if columns is None else columns.shape[2]
-        parts[case.trial.name] = course[start : start + width]
-        start += width
-    return parts
+    trials = list(_in_trials(rows, effect))
+    ends = np.cumsum([columns.shape[2] for _, columns in trials])
+    return {case.trial.name: part for (case, _), part in zip(trials, np.split(course, ends[:-1]), strict=True)}
 
 
 def _placed(search: Search, base: Hypothesis, one: _Touch) -> tuple[Transient, Array]:
-    """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
-    Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
-    several newton metres.
-    """
+    """Return the contact where its segment explains most, by Gauss-Newton of point and course, with its columns."""
     effect, Z, place, wide = one.effect, one.Z, np.zeros(3), SIZES[-1]
     for _ in range(_STEPS):
         course = wide * _mean(search, base, wide * Z, np.zeros(Z.shape[1]))
@@ -210,18 +201,14 @@ def _placed(search: Search, base: Hypothesis, one: _Touch) -> tuple[Transient, A
 
 
 def _mean(search: Search, base: Hypothesis, Z: Array, there: Array) -> Array:
-    """Return the posterior mean (k,) of the coefficients of further columns ``Z`` with unit normal priors, linearised
-    about ``there`` (k,).
-    """
+    """Return the posterior mean (k,) of unit-normal coefficients of ``Z``, linearised about ``there`` (k,)."""
     s, G = search.score(base, Z)
     # Target moved by Z there: its score is s + G there, while the prior stays centred at zero.
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
 def _slopes(rows: Rows, effect: Transient, place: Array, course: Array) -> Array:
-    """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
-    and axis (the wrench is linear in it).
-    """
+    """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) by its ``place``."""
     # np.eye(4, 3, -1): no step, then 1 m along each axis; a difference is the exact slope of a linear function.
     here, *there = (_felt(rows, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
     simulated = rows.white(np.stack([one - here for one in there], axis=1))
@@ -232,9 +219,7 @@ def _felt(rows: Rows, effect: Transient, course: Array) -> Array:
     """Return (r,): the rows of a contact with time course ``course`` (k,), split by trial."""
     assert rows.problem is not None
     samples = []
-    for case in rows.problem.cases:
-        columns = effect.local(case)
-        width = 0 if columns is None else columns.shape[2]
-        samples.append(np.zeros((case.motion.time.size, 6, 1)) if columns is None else columns @ course[:width, None])
-        course = course[width:]
+    for _, columns in _in_trials(rows, effect):
+        samples.append(columns @ course[: columns.shape[2], None])
+        course = course[columns.shape[2] :]
     return rows.problem.padded(rows.problem.spectrum.rows(tuple(samples))[:, :, 0])

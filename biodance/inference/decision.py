@@ -27,10 +27,10 @@ from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Key, Posterior
-from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.inference.scales import prior_sd
 from biodance.inference.sets import Search, hypothesis
+from biodance.inference.unknown import adequacy
 from biodance.observations import LANDMARK, shift_per_sd
 from biodance.observations.newton import Newton
 from biodance.records import SIDES, Array

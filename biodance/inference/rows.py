@@ -94,9 +94,7 @@ class Rows:
 
     def white(self, rows: Array) -> Array:
         """Return ``rows`` (r', n) of plates and markers in units of their nominal standard deviation."""
-        if self.problem is None:
-            return rows
-        return white(self.problem, self.tolerances, rows)
+        return rows if self.problem is None else white(self.problem, self.tolerances, rows)
 
     def mean_square(self, rows: Array) -> Array:
         """Return (Q + 1,) the mean square of ``rows`` (r,) in each band and channel of the plates; zero in markers and
@@ -150,9 +148,7 @@ class Rows:
 
     @cached_property
     def _grown(self) -> Array:
-        """(n,) by how much the middle of an observation's trial lies after the middle of the session, -0.5 to 0.5; 0
-        for trials that are not simulated: they have no place in the session's time.
-        """
+        """(n,) how far after the session's middle an observation's trial lies, -0.5 to 0.5; 0 if not simulated."""
         cases = self.problem.cases if self.problem else ()
         after = {case.trial.name: float(case.session_time.mean()) - 0.5 for case in cases}
         seen = self.evidence.observations if self.evidence else ()
@@ -238,10 +234,10 @@ def _simulated(
     problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances, care: Mapping[str, Care]
 ) -> tuple[Array, Array, list[str], _Units]:
     """Return columns, target and groups of the simulated rows, and `Rows.tolerated`."""
-    known, keys = nuisances(problem, tolerated), marker_keys(problem)
+    known = nuisances(problem, tolerated)
     columns = np.concatenate(known.parts, axis=1, dtype=float) * known.scale
     # The mean of a tolerance is taken off the target, so that every column has mean zero and unit variance.
-    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), keys)
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
     sizes = np.array([tolerances.size(key) for key in known.keys])
     columns *= sizes
     # Body's columns, tolerances and target are whitened in one pass over the rows.
@@ -257,9 +253,7 @@ def _simulated(
 def _with_observations(
     X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence, reach: Array
 ) -> tuple[Array, Array, list[str]]:
-    """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
-    shows in both.
-    """
+    """Return columns, target and groups with the observations below, in which tolerances of plates show, too."""
     own = np.array([one.sd for one in seen.observations])
     below = np.zeros((len(own), X.shape[1]))
     for name, (at, unit) in units.items():
@@ -274,9 +268,7 @@ def _with_observations(
 
 
 def _group(key: str, care: Mapping[str, Care]) -> str:
-    """Return the group of a key: what is alike in kind is as large, or as small, together; what was learned between
-    laboratories holds in this one as it is.
-    """
+    """Return the group of a key: alike in kind is as large together; learned between laboratories holds as it is."""
     if key in between_laboratories():
         return FIXED
     kind = key.removeprefix("habit ").split()[0]

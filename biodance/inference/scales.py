@@ -196,9 +196,10 @@ def as_anywhere(scales: Scales, rows: Rows) -> Scales:
     return replace(scales, groups=groups, members=np.minimum(scales.members, 0.0))
 
 
-def bare(columns: VisibleColumns) -> Products:
-    """Return the inner products of the columns with the session's target."""
-    return products(columns, np.empty((len(columns.X), 0)), columns.rows.y, np.ones(columns.rows.noises + 1))
+def bare(columns: VisibleColumns, y: Array | None = None) -> Products:
+    """Return the inner products of the columns with a target ``y`` (r,), the session's by default, without causes."""
+    y = columns.rows.y if y is None else y
+    return products(columns, np.empty((len(y), 0)), y, np.ones(columns.rows.noises + 1))
 
 
 def prior_sd(rows: Rows) -> Array:
@@ -275,9 +276,7 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
 
 
 def _cells(found: Products, at: Scales) -> tuple[NDArray[np.intp], Array]:
-    """Return the cell (K,) of each column, -1 for one of fixed scale, and (C, G + M) 1 where the logarithm of a cell's
-    scale has that of a group or of a member in it.
-    """
+    """Return the cell (K,) of each column, -1 if its scale is fixed, and (C, G + M) 1 for the logarithms it sums."""
     free = (found.group >= 0) | (found.member >= 0)
     pairs, of_free = np.unique([found.group[free], found.member[free]], axis=1, return_inverse=True)
     cell = np.full(found.group.size, -1)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
@@ -21,12 +20,11 @@ from biodance.inference.columns import VisibleColumns
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
-from biodance.inference.left import adequacy
 from biodance.inference.own_noise import own_noise
 from biodance.inference.rows import Rows, rows_of, with_observed
-from biodance.inference.scales import fit, nominal, prior_sd, products
+from biodance.inference.scales import bare, fit, nominal, prior_sd
 from biodance.inference.sets import Search, hypothesis, infer
-from biodance.inference.unknown import with_unknown
+from biodance.inference.unknown import adequacy, with_unknown
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
@@ -109,7 +107,7 @@ def _with_own_noise(
     (`own_noise`).
     """
     posed = seen.problem
-    power = power_about(posed.spectrum, posed.cases, known.whiteners(float(posed.cases[0].body.sip.mass.sum())))
+    power = power_about(posed.spectrum, posed.cases, known.whiteners(posed.mass))
     quiet, share = own_noise(rows_of(posed, every, known, evidence), power)
     if not share:
         return seen, quiet
@@ -128,7 +126,8 @@ def _inferred(
     if rows.problem is None:
         return search, infer(search)
     posed, phi = rows.problem, hypothesis(search, ()).phi
-    if _is_heavier(posed, phi):
+    # phi[::10]: the masses, first of ten parameters of each segment.
+    if np.any(phi[::10] - posed.prior.mass > _HEAVIER * posed.prior.mass):
         posed = posed.with_matter(phi)
         search = Search.of(rows_of(posed, every, rows.tolerances, evidence), search.causes)
     found = infer(search, _contacts)
@@ -146,19 +145,8 @@ def _of(every: tuple[Candidate, ...], asked: Mapping[str, Cause]) -> tuple[Candi
     return tuple(one for one in every if one.names[0] in asked)
 
 
-def _is_heavier(posed: Problem, phi: Array) -> bool:
-    """Return whether any segment looks so much heavier than its prior in ``phi`` (10N,) that what its matter errs by
-    with the markers grows noticeably (`Problem.with_matter`).
-    """
-    before = posed.prior.mass
-    # phi[::10]: the masses, first of ten parameters of each segment.
-    return bool(np.any(phi[::10] - before > _HEAVIER * before))
-
-
 def _predicts_otherwise(posed: Problem, phi: Array) -> bool:
-    """Return whether the parameters ``phi`` (10N,) predict wrenches that differ from those in use by more than
-    `_STALE`.
-    """
+    """Return whether ``phi`` (10N,) predicts wrenches that differ from those in use by more than `_STALE`."""
     both = np.zeros(2)
     for case in posed.cases:
         # (T, 6, 2): the change of the predicted wrench beside the wrench itself, each about its mean over time.
@@ -192,9 +180,7 @@ def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[
 
 
 def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosis:
-    """Return the diagnosis with what the body leaves of the forces, where only observations were asked for causes;
-    where nothing was compared with a body, nothing found is not nothing wrong.
-    """
+    """Return the diagnosis with what the body leaves of forces; nothing found is not clean with nothing compared."""
     if seen is None:
         return replace(one, explained=one.explained and bool(one.faults))
     rows = rows_of(seen.problem, seen.causes, known, None)
@@ -209,9 +195,7 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
 def _turned(
     evidence: ObservedEvidence, known: Tolerances, causes: Sequence[Candidate], asked: Mapping[str, Cause]
 ) -> tuple[Finding, ...]:
-    """Return the channel whose sign, turned back, puts the pressure under the feet and makes a step brake first and
-    push then; () where none is more probable than all signs as they are.
-    """
+    """Return the channel whose sign, turned back, puts pressures under feet; () if none is more probable."""
     counting, found = evidence.counting, []
     as_they_are: dict[bytes, tuple[VisibleColumns, float]] = {}
     for name, turned in counting.sign_reversed.items():
@@ -219,7 +203,7 @@ def _turned(
         if not here.any():
             continue
         if (key := here.tobytes()) not in as_they_are:
-            columns = _observed_alone(counting, here, known, causes)
+            columns = VisibleColumns.of(rows_of(None, causes, known, counting.where(here), everywhere=True))
             as_they_are[key] = columns, _log_evidence(columns, columns.rows.y)
         columns, as_is = as_they_are[key]
         own = np.array([one.sd for one in counting.observations])
@@ -240,21 +224,6 @@ def _turned(
     return (Finding(*name, (), alike, 1.0, advice=advice, probability=probability, kind=asked[name[0]]),)
 
 
-def _observed_alone(
-    evidence: ObservedEvidence, here: NDArray[np.bool_], known: Tolerances, causes: Sequence[Candidate]
-) -> VisibleColumns:
-    """Return the columns that are no fault of some observations, without any simulation."""
-    some = replace(
-        evidence,
-        observations=tuple(one for one, there in zip(evidence.observations, here, strict=True) if there),
-        sensitivities={n: t[here] for n, t in evidence.sensitivities.items()},
-        sign_reversed={},
-    )
-    return VisibleColumns.of(rows_of(None, causes, known, some, everywhere=True))
-
-
 def _log_evidence(columns: VisibleColumns, y: Array) -> float:
     """Return the log evidence of a target ``y`` (r,) without any cause."""
-    rows = columns.rows
-    found = products(columns, np.empty((len(y), 0)), y, np.ones(rows.noises + 1))
-    return fit(found, prior_sd(rows), nominal(rows)).log_evidence
+    return fit(bare(columns, y), prior_sd(columns.rows), nominal(columns.rows)).log_evidence

@@ -134,9 +134,7 @@ def infer(search: Search, further: Further = lambda _search, _base: ()) -> Poste
 
 
 def _as_loud_everywhere(search: Search, one: Hypothesis) -> float:
-    """Return the logarithm of the noise under which no band and channel leaves more than it beside the causes of a
-    hypothesis: what is no fault is then as large as anywhere, and excuses nothing of it.
-    """
+    """Return the logarithm of the noise under which no band and channel leaves more beside a hypothesis."""
     loud = one.fit.scales.noise
     for _ in range(_ROUNDS):
         square, count = energies(one)
@@ -172,9 +170,7 @@ def _searched(search: Search) -> Posterior:
 
 
 def _without_each(search: Search, known: dict[frozenset[tuple[str, str]], Hypothesis]) -> None:
-    """Add to the ``known`` hypotheses those that lack one cause of the most probable set, until none of them is more
-    probable: what was found first may have stood for what was found behind it.
-    """
+    """Add sets that lack one cause of the best of ``known``: what was found first may stand for what came later."""
     while True:
         best = max(known.values(), key=lambda one: one.log_posterior)
         for gone in best.causes if len(best.causes) > 1 else ():
@@ -311,10 +307,7 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
 
 
 def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[float, Array]]:
-    """Return what a cause gains near each of the sizes at which it is screened because it is far from proportion to its
-    size, and that size (1,): its prior there, and the volume that the data leave of it (Laplace, the slope taken as
-    that of the way from none).
-    """
+    """Return what a cause gains (Laplace) near each size at which it is screened, prior included, and the size."""
     out = []
     for share in effect.screened_at:
         # One column, the whole of what the cause adds at that size: coefficient 1.
@@ -328,9 +321,7 @@ def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[flo
 
 
 def _told_by_outliers(left: Array, z: Array) -> tuple[Array, Array]:
-    """Return what each cause with one column of ``z`` (n, k) gains (k,) where it explains observations that are
-    outliers without it (``left`` (n,)), whose weights say nothing of it; and its size (k,). Laplace, all else as it is.
-    """
+    """Return what each column of ``z`` (n, k) gains where it explains outliers of ``left`` (n,), and its size."""
     size, weight = np.zeros(z.shape[1]), np.ones(z.shape)
     for _ in range(_ROUNDS):
         # One size per column (ridge with unit-normal prior), then Student's weights at its residuals.

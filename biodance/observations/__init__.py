@@ -23,7 +23,6 @@ from biodance.discovery import Chosen, Family
 from biodance.observations._causes import (
     ObservableCause,
     Sensitivity,
-    corrected,
     possible_causes,
     sensitivities,
     sign_reversals,
@@ -46,8 +45,6 @@ __all__ = [
     "Observation",
     "Observer",
     "SeenTrial",
-    "Sensitivity",
-    "corrected",
     "observe",
     "observers",
     "possible_causes",

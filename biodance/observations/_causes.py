@@ -1,8 +1,7 @@
 """What causes do to a recording, and how an observation responds: to plates, clocks, the declared mass, foot markers.
 
 Plates' records are changed as a wrong file, cable or clock would change them; names and parameters are those of the
-effects (`biodance.effects`). What a fault of a plate does to its wrench is said once (`lab.plates.faults`):
-observations' sensitivities and the correction of a recording both come from it.
+effects (`biodance.effects`). What a fault of a plate does to its wrench is said once (`lab.plates.faults`).
 
 Every fault of a plate that is told by its wrench is an affine map of it: w becomes w + B [w; 1] with a matrix B (6, 7).
 The derivative of an observation with respect to B is all that any such fault needs (`plate_change`).
@@ -134,9 +133,7 @@ def _cause(fault: PlateFault, target: str, unit: str, step: float) -> Observable
 
 
 def _about_centre(plate: Plate, slope: Array, zero: Array) -> Array:
-    """Return the change B (6, 7) about the lab origin of ``slope`` (6, 6) @ wrench + ``zero`` (6,) about the centre of
-    a plate.
-    """
+    """Return B (6, 7) about the lab origin of ``slope`` (6, 6) @ wrench + ``zero`` (6,) about a plate's centre."""
     # About the centre, the fault there, and back about the origin.
     there, back = wrench_shift(plate.centre), wrench_shift(-plate.centre)
     return np.asarray(back @ np.column_stack([slope @ there, zero]))
@@ -185,30 +182,6 @@ def sensitivities(seen: SeenTrial, found: Sequence[_Observed], effect: str, targ
     return out
 
 
-def corrected(seen: SeenTrial, effect: str, target: str, size: float) -> SeenTrial:
-    """Return the recording that would have been made without a cause of a ``size``: the mass as weighed, or the plates
-    without their fault; a zero that the reader found and took off is still what the plate reads empty.
-    """
-    if effect == BodyMass.name:
-        return replace(seen, mass=seen.mass + size)
-    fault, (name, _, place) = PLATE_FAULTS[effect], target.rpartition(":")
-
-    def right(plate: Plate) -> Plate:
-        if name not in ("", plate.name):
-            return plate
-        if fault is OFFSET and was_zeroed(plate):
-            return replace(plate, zero=plate.zero - size * fault.zero(place)[:3])
-        return fault.done(plate, place, -size)
-
-    return replace(seen, trial=replace(seen.trial, plates=tuple(map(right, seen.trial.plates))))
-
-
-def _changed(wrench: Wrench, change: Array) -> Wrench:
-    value = wrench.value + wrench.value @ change[:, :6].T + change[:, 6]
-    value.setflags(write=False)  # the record keeps it without a copy
-    return Wrench(wrench.time, value)
-
-
 def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], tuple[str, Array]]:
     """Return by effect and target the plate and the change B (6, 7) that turn one channel round, about its centre.
 
@@ -228,11 +201,12 @@ def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str],
 
 def with_changed_plate(seen: SeenTrial, name: str, change: Array) -> SeenTrial:
     """Return the recording with a plate's wrench changed by B (6, 7) about the lab origin."""
-    plates = [
-        replace(plate, wrench=_changed(plate.wrench, change)) if plate.name == name else plate
-        for plate in seen.trial.plates
-    ]
-    return replace(seen, trial=replace(seen.trial, plates=tuple(plates)))
+    plate = seen.plate(name)
+    value = plate.wrench.value + plate.wrench.value @ change[:, :6].T + change[:, 6]
+    value.setflags(write=False)  # the record keeps it without a copy
+    other = replace(plate, wrench=Wrench(plate.wrench.time, value))
+    plates = tuple(other if one is plate else one for one in seen.trial.plates)
+    return replace(seen, trial=replace(seen.trial, plates=plates))
 
 
 def was_zeroed(plate: Plate) -> bool:

@@ -90,11 +90,6 @@ class FootPath:
         """Heel marker and front where they were seen."""
         return track_of(self.time, self.heel), track_of(self.time, self.front)
 
-    @cached_property
-    def toe_track(self) -> Track:
-        """Toe marker where it was seen."""
-        return track_of(self.time, self.toe)
-
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return heel and front (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
         heel, front = self.tracks
@@ -153,11 +148,6 @@ class FootPath:
         return self._velocity.at(time)
 
     @cached_property
-    def pointing(self) -> Array:
-        """(3,) m from the heel marker to the front, the median over the trial."""
-        return np.asarray(np.nanmedian(self.front - self.heel, axis=0))
-
-    @cached_property
     def lowest(self) -> Array:
         """(2,) m: the lowest places of the heel marker and of the front in the trial."""
         return np.array([np.nanmin(path[:, 2]) for path in (self.heel, self.front)])
@@ -196,9 +186,7 @@ def feet_of(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, 
 
 
 def _foot(markers: Markers, set_name: str, side: str, heel: Array, toe: Array) -> FootPath:
-    """Return one foot with its front: the middle of the markers on both edges of the forefoot, or half a forefoot's
-    breadth inside that on the outer one, if it lies outwards of the toe marker (its label may be another's).
-    """
+    """Return one foot, its front between the markers on the edges of the forefoot, or inwards of the outer one."""
     inner, outer = (_landmark(markers, set_name, f"{side}_toe_{edge}") for edge in ("medial", "lateral"))
     if any(edge is not None and np.array_equal(toe, edge, equal_nan=True) for edge in (inner, outer)):
         return FootPath(side, markers.time, heel, toe, toe, centred=False)

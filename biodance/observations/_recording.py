@@ -235,7 +235,9 @@ def _step(
     if mixed and beside_it(time):
         return None
     near = _neighbours(plate, plates) if mixed or over[foot.side] < 0 else []
-    beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
+    loads = [np.interp(time, one.wrench.time, one.wrench.force[:, 2]) for one in near if one.wrench.time.size]
+    carry = bool(loads) and float(np.median(np.sum(loads, axis=0))) > ONSET
+    beside = tuple(one.name for one in near) if mixed or carry else ()
     if mixed and not beside:
         return None
     overhang = 0.0 if beside or not plate.placed else max(0.0, -over[foot.side])
@@ -243,9 +245,7 @@ def _step(
 
 
 def _neighbours(plate: Plate, plates: tuple[Plate, ...]) -> list[Plate]:
-    """Return the plates of the same height whose edges come so near to those of one that a foot stands on both; none
-    where the file says only where the pressure was, not where the plate lies.
-    """
+    """Return the plates of the same height so near to one that a foot stands on both; none if it is not placed."""
     if not plate.placed:
         return []
     share = np.linspace(0.0, 1.0, 20)[:, None]
@@ -255,16 +255,8 @@ def _neighbours(plate: Plate, plates: tuple[Plate, ...]) -> list[Plate]:
     return [one for one in level if inside(one, edge).max() > -_BESIDE]
 
 
-def _carry(plates: list[Plate], time: Array) -> bool:
-    """Return whether plates carry a load at most of some times."""
-    force = [np.interp(time, one.wrench.time, one.wrench.force[:, 2]) for one in plates if one.wrench.time.size]
-    return bool(force) and float(np.median(np.sum(force, axis=0))) > ONSET
-
-
 def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
-    """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
-    median over times; negative outside.
-    """
+    """Return how far (m) the sole is inside the plate, its middle on a ``raised`` one: median; negative outside."""
     distance = inside(plate, foot.outline(time))
     distance = distance.mean(axis=1) if raised else distance.min(axis=1)
     return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
@@ -283,9 +275,7 @@ def _stands(foot: FootPath, time: Array) -> bool:
 
 
 def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
-    """Return whether any part of a foot is over the plate, low and no faster than the ground (``belt`` (3,) m/s), at
-    a tenth of some times (n,) s of a contact.
-    """
+    """Return whether a foot is over the plate, low and no faster than its ``belt``, at a tenth of some times (n,) s."""
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
         slow = np.linalg.norm(foot.velocity_at(time) - belt, axis=1) < _STILL
@@ -295,6 +285,5 @@ def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
 
 def _heel_first(foot: FootPath, first: float) -> bool:
     """Return whether the front is farther above its standing height than the heel when a contact begins."""
-    at = np.array([first])
-    heel, front = (path[0, 2] for path in foot.at(at))
+    heel, front = (path[0, 2] for path in foot.at(np.array([first])))
     return bool(front - foot.resting[1] > heel - foot.resting[0] + 0.01)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.observations._causes import Sensitivity, by_plate, of_mean, pressure_gradient
-from biodance.observations._feet import FootPath, InFoot, Track
+from biodance.observations._feet import FootPath, InFoot, Track, track_of
 from biodance.observations._recording import ONSET, FootStep, SeenTrial
 from biodance.records import Array, Wrench
 
@@ -82,9 +82,7 @@ def walks(seen: SeenTrial, step: FootStep) -> bool:
 
 
 def _swings(foot: FootPath, marker: Track, middle: float, near: float, *, before: bool = False) -> bool:
-    """Return whether a ``marker`` swings off within 0.3 s after ``near`` s (``before``: comes so), against the ground
-    or belt on which the foot stands at ``middle`` s.
-    """
+    """Return whether a ``marker`` swings off within 0.3 s after ``near`` s (``before``: comes so), against the belt."""
     time = near + np.linspace(0.0, -_SWING if before else _SWING, 7)
     belt = foot.drift(np.linspace(middle - 0.1, middle + 0.1, 5))[:2]
     # Relative to the belt, which would carry a standing foot along, too.
@@ -107,7 +105,7 @@ def _steps(seen: SeenTrial, step: FootStep) -> bool:
         return False
     first, last = seen.plate(step.plate).wrench.time[[part.start, part.stop - 1]]
     came = _swings(foot, foot.tracks[0], step.middle, float(first), before=True)
-    return came or _swings(foot, foot.toe_track, step.middle, float(last))
+    return came or _swings(foot, track_of(foot.time, foot.toe), step.middle, float(last))
 
 
 def crossing(wrench: Wrench, sample: int) -> tuple[float, Array]:

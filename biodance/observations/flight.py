@@ -5,9 +5,9 @@ import numpy as np
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
 from biodance.motion.contact import falls_freely
-from biodance.observations import FootPath, Observation, Observer, SeenTrial
+from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._causes import Sensitivity, of_mean
-from biodance.records import Array, runs
+from biodance.records import runs
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
@@ -57,16 +57,12 @@ class Flight(Observer):
 
 def _in_air(seen: SeenTrial) -> list[tuple[float, float]]:
     """Return first and last time s of every flight: both feet are high, and the body falls (feet of who sits hang)."""
-    feet = seen.feet
-    high, time = np.min([_height(foot) for foot in feet], axis=0) > _HIGH, feet[0].time
-    long = [(a, b) for a, b in runs(high) if b - a >= max(2, _SHORTEST * feet[0].rate)]
+    paths = [path[:, 2] for foot in seen.feet for path in (foot.heel, foot.toe)]
+    # The lowest of all markers above its own lowest place; one that is not seen is not high.
+    above = np.min([np.nan_to_num(path - np.nanmin(path), nan=-np.inf) for path in paths], axis=0)
+    time, rate = seen.feet[0].time, seen.feet[0].rate
+    long = [(a, b) for a, b in runs(above > _HIGH) if b - a >= max(2, _SHORTEST * rate)]
     return [(time[a], time[b - 1]) for a, b in long if falls_freely(seen.trial, a, b)]
-
-
-def _height(foot: FootPath) -> Array:
-    """Return (T,) m how far the lower one of a foot's markers is above its lowest place; -inf where not seen."""
-    each = [path[:, 2] - np.nanmin(path[:, 2]) for path in (foot.heel, foot.toe)]
-    return np.nan_to_num(np.minimum(*each), nan=-np.inf)
 
 
 OBSERVER = Flight

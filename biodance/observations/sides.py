@@ -4,7 +4,6 @@ from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._stance import step_course
 
-_MIDDLE = (0.1, 0.6)
 _OWN = 0.009
 """m: right less left foot of one visit."""
 
@@ -25,7 +24,7 @@ class Sides(Observer):
             right, left = sides.get("right"), sides.get("left")
             if right is None or left is None:
                 continue
-            (one, responds), (other, too) = (side.place(1, *_MIDDLE) for side in (right, left))
+            (one, responds), (other, too) = (side.place(1, 0.1, 0.6) for side in (right, left))
             what = f"right less left foot, {first.plate} and {last.plate} from {first.middle:.2f} s"
             found.append(
                 Observation(

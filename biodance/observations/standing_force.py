@@ -66,9 +66,7 @@ class StandingForce(Observer):
 
 
 def _level(axis: int) -> float:
-    """Return the share of the weight (one sd) that a usual laboratory puts into a horizontal channel in every trial
-    alike: its vertical and its plate lean about the other axis, and Fz leaks into the channel.
-    """
+    """Return the share of the weight (one sd) that leaning and cross-talk put into a horizontal channel everywhere."""
     about, channel = "yx"[axis], ("Fx", "Fy")[axis]
     lean = error_size(LabTilt.name, about), error_size(PlateRotation.name, about)
     return float(np.linalg.norm([*lean, error_size(PlateCrosstalk.name, f"Fz->{channel}")]))

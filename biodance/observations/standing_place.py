@@ -11,7 +11,6 @@ from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._causes import Sensitivity, by_plate, pressure_gradient
 from biodance.observations.standing_force import mean_force
-from biodance.records import Array
 
 _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
 """m: expected place, sd of one person, sd of one laboratory (shoes, posture asked for, where the pelvis markers sit):
@@ -41,9 +40,12 @@ class StandingPlace(Observer):
         if not plates or not seen.still or not seen.whole or seen.pelvis is None or not seen.feet:
             return ()
         force = mean_force(seen.total.force)[2]
-        ahead = _facing(seen)
-        if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
+        # Both feet point this way on average, each in the median over the trial.
+        ahead = np.mean([np.nanmedian(foot.front - foot.heel, axis=0)[:2] for foot in seen.feet], axis=0)
+        length = float(np.linalg.norm(ahead))
+        if not force > 0.75 * seen.mass * trial.settings.gravity or not length > 0.05:
             return ()
+        ahead = ahead / length
         height = float(np.mean([plate.height for plate in plates]))
         pressure = seen.total.cop(height=height)[:, :2]
         known = np.isfinite(pressure).all(axis=1)
@@ -67,13 +69,6 @@ class StandingPlace(Observer):
             )
             for what, (axis, (expected, person, laboratory)) in axes.items()
         )  # fmt: skip
-
-
-def _facing(seen: SeenTrial) -> Array | None:
-    """Return the unit vector (2,) along which both feet point on average; None where they are not seen."""
-    both = np.mean([foot.pointing[:2] for foot in seen.feet], axis=0)
-    length = float(np.linalg.norm(both))
-    return both / length if length > 0.05 else None
 
 
 OBSERVER = StandingPlace

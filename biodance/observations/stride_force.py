@@ -6,7 +6,7 @@ middle of a stance the other foot swings: one plate alone says the same a little
 other. A foot that reaches over the edge of its plate does not weigh: what it treads on beside it is not measured.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -71,7 +71,9 @@ class StrideForce(Observer):
         """Return one mass and two horizontal forces for each whole step, and one mass of all strides on a belt."""
         if seen.pelvis is None or not seen.mass > 0:
             return ()
-        return (*(one for pair in _pairs(seen) for one in self._whole(seen, *pair)), *self._lasting(seen))
+        swung = pairwise(step for step in seen.steps if steps(seen, step))
+        pairs = [(a, b) for a, b in swung if a.side != b.side and a.plate != b.plate and seen.one_clock]
+        return (*(one for pair in pairs for one in self._whole(seen, *pair)), *self._lasting(seen))
 
     def _lasting(self, seen: SeenTrial) -> list[Observation]:
         moving = [step for step in seen.steps if seen.belt(step) is not None]
@@ -149,9 +151,7 @@ class _Means:
 
 
 def _means(seen: SeenTrial, time: Array, by: Mapping[str, Array]) -> _Means:
-    """Return the means over times (n,) s: the acceleration is that of the path, weighed with the weights' second
-    derivative.
-    """
+    """Return the means over times (n,) s; the acceleration is the path, weighed with the weights' second derivative."""
     share, bend = fading(time)
     path, speed = seen.pelvis_track.at(time), seen.pelvis_track.speed_at(time)
     # Twice by parts: the mean of w x'' is that of w'' x; w'' sums to nothing, so a constant place does not count.
@@ -181,14 +181,6 @@ def _weighed(
     )
 
 
-def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
-    """Return steps that follow one another with different feet, the second before the first has ended."""
-    swung = [step for step in seen.steps if steps(seen, step)]
-    for first, last in pairwise(swung):
-        if first.side != last.side and first.plate != last.plate and seen.one_clock:
-            yield first, last
-
-
 def _between_flights(seen: SeenTrial, step: FootStep) -> slice | None:
     """Return the samples from the middle of the flight before a step to that of the flight after it; None without."""
     part = seen.stance(step)
@@ -213,9 +205,7 @@ def _elsewhere(seen: SeenTrial, span: slice, *plates: str) -> NDArray[np.bool_]:
 
 
 def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
-    """Return the samples from the single support of one step to the end of that of the next, or less, as long as no
-    other plate is loaded; None where a foot is in the air between, reaches beside its plate or stands elsewhere.
-    """
+    """Return the samples from one single support to the end of the next with no other plate loaded; None without."""
     one, two = seen.stance(first), seen.stance(last)
     if one is None or two is None or two.start >= one.stop or first.overhang or last.overhang:
         return None

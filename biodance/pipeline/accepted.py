@@ -19,10 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
+from biodance.diagnosis.accept import Gain, Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
 from biodance.diagnosis.consequence import NAMED
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.repairs import failed_check
 from biodance.display import cause_in_words, spaced
 from biodance.effects import Case, Cause, NamedCause, QualityCheck, Recorded

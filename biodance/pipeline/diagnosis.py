@@ -4,9 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import SessionTolerances, own_tolerances
-from biodance.diagnosis.plate_axes import with_plate_axes
+from biodance.diagnosis.plate_axes import of_family, with_plate_axes
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence

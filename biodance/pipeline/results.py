@@ -14,9 +14,8 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.diagnosis.accept import Residuals
+from biodance.diagnosis.accept import Gain, Residuals
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
-from biodance.diagnosis.gain import Gain
 from biodance.effects import QualityCheck
 from biodance.effects._base.exchanged_labels import Pair, Spans
 from biodance.identification.identification import Identification

@@ -132,23 +132,8 @@ class Noise:
         """Return the same noise for a recording at ``rate`` Hz, at the rate that its thinned samples really have."""
         return replace(self, bands=self.bands.at(rate))
 
-    def whiten(self, rows: Array) -> Array:
-        """Return whitened rows (m, 6, n), m <= T, of consecutive samples ``rows`` (T, 6, n) of wrenches about the lab
-        origin.
-        """
-        shifted = self.shift @ rows
-        if self.bands.white:
-            return np.asarray(np.linalg.solve(np.linalg.cholesky(self.covariance[0]), shifted))
-        band = self.bands.of(len(rows))
-        keep = band >= 0
-        # L^-1 with S = L L' per band: L^-1 r has unit covariance, L^-T L^-1 = S^-1.
-        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        return inverse[band[keep]] @ self.bands.coefficients(shifted)[keep]
-
     def weighted(self, rows: Array) -> Array:
-        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and
-        its transpose.
-        """
+        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin."""
         inverse, band = np.linalg.inv(self.covariance), self.bands.of(len(rows))
         if self.bands.white:
             return np.asarray(self.shift.T @ (inverse[0] @ (self.shift @ rows)))

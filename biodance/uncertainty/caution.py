@@ -64,9 +64,7 @@ def misplaced(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
 
 
 def _by_segment(sip: Sip, slope: Callable[[str, Array], Array]) -> Array:
-    """Return the covariance (p, p) with S S' of each segment on its diagonal, S (10, n) what ``slope`` gives for its
-    name and parameters (10,): n independent errors of one standard deviation, each segment's its own.
-    """
+    """Return the covariance (p, p) of errors ``slope`` (10, n) of unit deviation, each segment's its own."""
     each = (slope(name, phi) for name, phi in zip(sip.segments, sip.phi.reshape(-1, 10), strict=True))
     return np.asarray(block_diag(*(one @ one.T for one in each)))
 
@@ -158,9 +156,7 @@ def shift_slope(phi: Array) -> Array:
 
 
 def _mass_spread(prior: Sip) -> Array:
-    """Return the covariance (p, p) that raises every relative mass sd to the floor of a table, sides alike, the total
-    mass unchanged; masses that girths told have none.
-    """
+    """Return the covariance (p, p) that raises every relative mass sd to the floor of a table, total unchanged."""
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
     least = error_size("segment_mass", "floor") * np.array(
@@ -185,9 +181,7 @@ def _mass_spread(prior: Sip) -> Array:
 
 @functools.cache
 def _averaged(segment: str) -> float:
-    """Return how much less a segment of several parts may be off than a part (1 of one part): relative errors of parts
-    are independent and average (trunk and head of three parts: 0.61).
-    """
+    """Return how much less a segment of several parts may be off than one part: independent errors average."""
     parts = PARTS.get(segment.removeprefix("right_").removeprefix("left_"), ())
     if len(parts) < 2:
         return 1.0

@@ -289,8 +289,3 @@ def in_segments(trial: Response, residual: Array) -> Array:
     worn = list(trial.body.markers.segment)
     back = np.swapaxes(trial.pose.rotation[:, worn], -1, -2)
     return np.asarray(back @ residual.reshape(*back.shape[:3], -1))
-
-
-def mean_squares(left: Array) -> Array:
-    """Return (K,) mean square distance of markers that are ``left`` (F, 3M, K) m from the model."""
-    return np.asarray(3 * np.mean(left**2, axis=(0, 1)))

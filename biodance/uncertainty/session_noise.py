@@ -63,15 +63,13 @@ def camera_noise(trials: Iterable[Markers]) -> float:
     """Return the noise of one marker coordinate from frame to frame, m: the median over markers, axes and trials; 0
     where no marker is seen for long.
     """
-    found = [white_noise(one.xyz[:, on]).ravel() for one in trials for on in [_seen(one)] if on.any()]
-    values = np.concatenate(found) if found else np.empty(0)
+    found = [np.empty(0)]
+    for one in trials:
+        long = np.isfinite(one.xyz).all(axis=2).sum(axis=0) >= _ENOUGH + _ORDER
+        found.append(white_noise(one.xyz[:, long]).ravel())
+    values = np.concatenate(found)
     values = values[np.isfinite(values)]
     return float(np.median(values)) if values.size else 0.0
-
-
-def _seen(one: Markers) -> np.ndarray:
-    """Return which markers (K,) are seen long enough."""
-    return np.asarray(np.isfinite(one.xyz).all(axis=2).sum(axis=0) >= _ENOUGH + _ORDER)
 
 
 def plate_noise(plates: Iterable[Plate]) -> Array:
@@ -145,9 +143,7 @@ def _unseen(joint: str, state: str) -> float:
 
 
 def _felt(body: Body, q: Array, about: Array) -> tuple[Array, Array]:
-    """Return twice (6, nv): what the wrench about ``about`` (3,) m changes by per unit of the tangent of a posture, by
-    the weight of what is displaced, and per unit of its second derivative, by what is accelerated.
-    """
+    """Return (6, nv) twice: the wrench about ``about`` (3,) m per unit displaced (weight), and accelerated."""
     pose, turn = poses(body, q[None]), np.eye(body.nv)
     if body.n_root:
         # Pinocchio's root velocities are in the root's axes; the tangent here is in lab axes: R' brings them there.
@@ -162,9 +158,7 @@ def _felt(body: Body, q: Array, about: Array) -> tuple[Array, Array]:
 
 
 def _powers(hung: Array, moved: Array) -> Array:
-    """Return (3, n, 6, 6): covariance per power 0, 2 and 4 of the angular frequency of n errors, of which (n, 6, k) are
-    ``hung`` and ``moved`` per unit (`_felt`).
-    """
+    """Return (3, n, 6, 6): covariance per power 0, 2, 4 of the angular frequency of n errors, as `_felt` tells them."""
     # Wrench H x + M x'', with x'' = -w² x: H H' - w² (H M' + M H') + w⁴ M M'.
     both = hung @ moved.swapaxes(1, 2)
     return np.stack([hung @ hung.swapaxes(1, 2), -(both + both.swapaxes(1, 2)), moved @ moved.swapaxes(1, 2)])
@@ -314,9 +308,7 @@ class SkinUnrest:
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Coefficients of all runs: of ``angles`` (m, 1 + A) with a constant, of the markers' places on the body ``local``
-    (m, K, 3) m, NaN = not seen, and of the ``specific`` force there (m, K, 3) m/s²; ``frequency`` (m,) Hz.
-    """
+    """Coefficients of all runs: joint ``angles`` with a constant, places and ``specific`` force of markers."""
 
     angles: Array
     local: Array
@@ -346,9 +338,7 @@ def _middle(power: Array) -> Array:
 
 
 def _excess(power: Array, usual: tuple[float, ...]) -> Array:
-    """Return (B, 3, M): the share of the ``power`` of every marker by which the middle one exceeds what is ``usual``
-    (B,) m.
-    """
+    """Return (B, 3, M): the share of every marker's ``power`` by which the middle one exceeds the ``usual`` (B,) m."""
     middle = _middle(power)
     # Share of the power beyond the usual: 1 - usual² / measured², as independent parts add in power.
     share = np.maximum(1 - np.square(usual) / np.maximum(middle[:, 0], 1e-12), 0.0)
@@ -385,9 +375,7 @@ def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> I
 
 
 def _left(every: _Runs, marker: int) -> Array:
-    """Return (2, B, 3): waves and swing of one marker, per axis and coefficient; zero for one that was not seen in half
-    of the time. How far it lags is measured below the fastest band, where markers show the cameras.
-    """
+    """Return (2, B, 3): waves and swing of one marker per axis and coefficient; zero if unseen half of the time."""
     out, seen = np.zeros((2, len(BANDS), 3)), np.isfinite(every.local[:, marker]).all(axis=1)
     if seen.mean() < 0.5:
         return out

@@ -24,7 +24,7 @@ from biodance.motion.ik.compiled.tree import FOUR, add_products
 from biodance.motion.kinematics import Poses, below, chains, neighbours, poses
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, skew
-from biodance.uncertainty.response import ErrorSource, Response, in_segments, mean_squares
+from biodance.uncertainty.response import ErrorSource, Response, in_segments
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,8 @@ class _Moved(ErrorSource):
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers that lie elsewhere."""
-        return mean_squares(trial.left(*self._moved(trial)))
+        # Three coordinates of each marker make its square distance.
+        return np.asarray(3 * np.mean(trial.left(*self._moved(trial)) ** 2, axis=(0, 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +93,7 @@ class Centre(_Carried):
             yield np.tile(drift, (1, rows.size // 3, 1)), rows
 
     def _drifts(self, trial: Response) -> Iterator[tuple[tuple[Index, Index], Array]]:
-        """Yield for every anatomical joint what hangs on it and (F, 3, 3) m of its drift, lab, per metre along the
-        parent's axes.
-        """
+        """Yield for every joint what hangs on it and (F, 3, 3) m of its drift, lab, per metre on the parent's axes."""
         for chain, hanging, neutral in self._still:
             child = self.body.joints[chain[-1]].segment
             yield hanging, _above(self.body, trial.pose, chain[0]) - trial.pose.rotation[:, child] @ neutral
@@ -322,14 +321,9 @@ class Flesh(_WithAngles):
         return np.zeros((len(self.body.markers.names), 3, len(self.groups)))
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
-        for s, near in enumerate(self._beside):
+        for s, near in enumerate(_near(self.body)):
             # Functionals of a displacement (lab) times R: per metre along the segment's axes.
             yield trial.place[:, s] @ trial.pose.rotation[:, s], near
-
-    @cached_property
-    def _beside(self) -> tuple[Index, ...]:
-        """For every segment the angles beside it."""
-        return _near(self.body)
 
     def squares(self, trial: Response) -> Array:
         """Return zeros: no marker sees it."""
@@ -439,9 +433,7 @@ def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) 
 
 
 def _patterns(body: Body) -> tuple[Array, ...]:
-    """Return per segment the rigid displacements (m, 3, P) of its markers: three translations, and turns that are not
-    null.
-    """
+    """Return per segment the rigid displacements (m, 3, P) of its markers: translations, and turns that move any."""
     worn, found = np.array(body.markers.segment), []
     for s in range(len(body.segments)):
         places = body.markers.position[worn == s]

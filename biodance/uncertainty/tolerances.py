@@ -217,23 +217,23 @@ def to_toml(found: Tolerances, *, under: str = "") -> str:
     lines.append("noise = [")
     for band in found.noise:
         lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
-    lines += ["]", "", *_instruments_text(found.instruments, prefix), "", f"[{prefix}sizes]"]
+    own = found.instruments
+    known = np.isfinite(own.marker_distance)
+    lines += [
+        "]",
+        "",
+        f"[{prefix}instruments]",
+        f"camera_m = {own.camera:.4g}",
+        f"plate_n_per_root_hz = [{', '.join(f'{x:.4g}' for x in own.plate)}]",
+        *([f"marker_distance_m = {own.marker_distance:.4g}"] if known else []),
+        f"skin_m = [{', '.join(f'{x:.4g}' for x in own.skin)}]",
+        f"swing_m = [{', '.join(f'{x:.4g}' for x in own.swing)}]",
+        "",
+        f"[{prefix}sizes]",
+    ]
     lines += [f'"{key}" = {value:.9g}' for key, value in sorted(found.sizes.items())]
     lines += ["", f"[{prefix}means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
     return "\n".join(lines) + "\n"
-
-
-def _instruments_text(found: InstrumentNoise, prefix: str) -> list[str]:
-    """Return the table ``[instruments]``."""
-    known = np.isfinite(found.marker_distance)
-    return [
-        f"[{prefix}instruments]",
-        f"camera_m = {found.camera:.4g}",
-        f"plate_n_per_root_hz = [{', '.join(f'{x:.4g}' for x in found.plate)}]",
-        *([f"marker_distance_m = {found.marker_distance:.4g}"] if known else []),
-        f"skin_m = [{', '.join(f'{x:.4g}' for x in found.skin)}]",
-        f"swing_m = [{', '.join(f'{x:.4g}' for x in found.swing)}]",
-    ]
 
 
 def key_of(name: str, target: str) -> str:

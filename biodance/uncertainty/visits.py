@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
+from biodance.settings import STANDARD_GRAVITY
 
 FEWEST_STRIDES = 3
 """Strides of a visit without which nothing is said of a change."""
 FALSE_DISCOVERIES = 0.05
 """Share of the changes told that may be chance (Benjamini-Hochberg)."""
 _COVERAGE = 0.95
-_G = 9.80665
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def placement_sd(of: KeyKind) -> float:
     if of.unit in ("N·m/kg", "W/kg"):
         joint = of.quantity.partition("_")[0]
         # m g d for 1 kg; a power is this moment times the joint's rate.
-        return _G * placement_sizes()[joint] * (of.rate if of.unit == "W/kg" else 1.0)
+        return STANDARD_GRAVITY * placement_sizes()[joint] * (of.rate if of.unit == "W/kg" else 1.0)
     marker, two = placement_sizes()["marker"], float(np.sqrt(2))
     sizes = {
         "stride_length": marker,

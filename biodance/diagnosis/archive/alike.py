@@ -92,7 +92,8 @@ def likenesses(sessions: Sequence[SessionLeft]) -> tuple[AlikeSessions, ...]:
     needed = float(np.tanh(-ndtri(_CHANCE / len(pairs)) / np.sqrt(independent - 3)))
     alike: dict[int, dict[int, float]] = {}
     for i, j in pairs:
-        correlation = _correlation(pattern[i], pattern[j])
+        flat = min(pattern[i].std(), pattern[j].std()) < 1e-9
+        correlation = 0.0 if flat else float(np.corrcoef(pattern[i], pattern[j])[0, 1])
         if correlation >= max(needed, _LEAST):
             alike.setdefault(i, {})[j] = alike.setdefault(j, {})[i] = correlation
     return tuple(_of_one(sessions, cells, pattern, i, near) for i, near in sorted(alike.items()))
@@ -112,9 +113,3 @@ def _of_one(
         min(near.values()),
         tuple(cells[int(k)] for k in most),
     )
-
-
-def _correlation(first: Array, second: Array) -> float:
-    if first.std() < 1e-9 or second.std() < 1e-9:
-        return 0.0
-    return float(np.corrcoef(first, second)[0, 1])

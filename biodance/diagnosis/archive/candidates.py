@@ -129,11 +129,7 @@ def candidates_of(series: Series) -> Candidates:
 
 
 def _distinct(found: Candidates) -> NDArray[np.intp]:
-    """Return the indices of the columns that are neither empty nor the same as an earlier one.
-
-    Every row has a large number drawn by chance; two columns are the same if these times their millionths, summed
-    modulo 2^64 (exact in any order), are.
-    """
+    """Return the indices of the columns that are neither empty nor, by random sums, the same as an earlier one."""
     groups, out = found.groups, []
     marks = np.random.default_rng(0).integers(2**64, size=groups.visit.size, dtype=np.uint64)
     for share in found.shares.T:

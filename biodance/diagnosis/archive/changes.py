@@ -27,7 +27,6 @@ _FEWEST = 3
 """Rows beyond the columns without which nothing is looked for."""
 _DRAWS, _AT_ONCE, _NUMBERS = 6000, 500, 4_000_000
 """Draws of the largest effect; at most so many at once, and so many numbers of one kind in memory."""
-_ROUNDING = 1e-9
 _DATE = 3.84
 """Fall of twice the log likelihood within which a date is not excluded (chi-square, 95 %)."""
 
@@ -117,9 +116,7 @@ def history(series: Series) -> History:
 
 
 def _next(series: Series, possible: Candidates, columns: Array, alarm: float) -> PlateCandidate | None:
-    """Return what explains most of what ``columns`` (n, K) leave, of the kinds that chance does not explain; None where
-    there is nothing.
-    """
+    """Return what explains most of what ``columns`` (n, K) leave and chance does not; None where there is nothing."""
     if series.value.size - columns.shape[1] < _FEWEST or np.linalg.matrix_rank(columns) < columns.shape[1]:
         return None
     fitted = fit_series(series, columns)
@@ -178,11 +175,9 @@ class Rivals:
 
 
 def _best(rivals: Rivals, value: Array) -> tuple[float, int]:
-    """Return the largest studentised effect in ``value`` (n,), and which candidate it is: the first of those that
-    differ by rounding only.
-    """
+    """Return the largest studentised effect in ``value`` (n,), and which candidate it is; the first of equals."""
     size = np.abs(rivals.studentised(value[:, None])[:, 0])
-    return float(size.max()), int(rivals.index[np.argmax(size >= (1 - _ROUNDING) * size.max())])
+    return float(size.max()), int(rivals.index[np.argmax(size >= (1 - 1e-9) * size.max())])
 
 
 def _columns(series: Series, possible: Candidates, chosen: list[PlateCandidate]) -> Array:

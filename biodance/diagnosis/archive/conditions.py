@@ -71,9 +71,7 @@ def pool(value: Array, sd: Array) -> Pooled:
 
 
 def _between(value: Array, variance: Array) -> float:
-    """Return the variance between persons at which the weighted scatter is what it should be; 0 where errors explain
-    it.
-    """
+    """Return the variance between persons that makes the weighted scatter what it should be; 0 without any."""
 
     def excess(between: float) -> float:
         weight = 1 / (variance + between)
@@ -124,7 +122,12 @@ def condition_effects(observations: Sequence[PlateEvidence]) -> tuple[ConditionE
     """Return the effects of conditions that matter and that chance does not explain, each quantity, plate and level
     tested with its share of the alarm rate; one visit alone tells none, for its zero may have jumped in between.
     """
-    tested = [effect for some in _kinds(observations) for effect in _effects(some)]
+    # Apart by quantity and plates, where trials say in what they differ.
+    kinds: dict[tuple[str, tuple[str, ...]], list[PlateEvidence]] = {}
+    for one in observations:
+        if one.conditions:
+            kinds.setdefault((one.quantity, tuple(sorted(one.plates))), []).append(one)
+    tested = [effect for some in kinds.values() for effect in _effects(some)]
     return tuple(
         one
         for one in tested
@@ -144,22 +147,16 @@ def without_conditions(
     )
 
 
-def _kinds(observations: Sequence[PlateEvidence]) -> list[list[PlateEvidence]]:
-    """Return the observations apart by quantity and plates, where trials say in what they differ."""
-    kinds: dict[tuple[str, tuple[str, ...]], list[PlateEvidence]] = {}
-    for one in observations:
-        if one.conditions:
-            kinds.setdefault((one.quantity, tuple(sorted(one.plates))), []).append(one)
-    return list(kinds.values())
-
-
 def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
     """Return what every level of every factor changes, pooled over the visits that have it beside the base."""
     bases = {factor: _base(some, factor) for factor in sorted({name for one in some for name in one.conditions})}
     visits: dict[PlateVisit, list[PlateEvidence]] = {}
     for one in sorted(some, key=lambda one: str(one.visit)):  # stable: trials of a visit stay in their order
         visits.setdefault(one.visit, []).append(one)
-    spread = _pooled_scatter(list(visits.values()), bases)
+    # The variance of one trial about its visit and conditions, over all visits.
+    rows = [_left(own, _dummies(own, bases)[0])[1:] for own in visits.values()]
+    free, spread = sum(row[1] for row in rows), float(np.median([one.sd**2 for one in some]))
+    spread = max(spread, sum(row[0] for row in rows) / free) if free else spread
     found: dict[tuple[str, str], list[tuple[PlateVisit, float, float]]] = {}
     for visit, own in visits.items():
         for key, value, sd in _differences(own, bases, spread):
@@ -171,11 +168,11 @@ def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
             factor,
             level,
             bases[factor],
-            tuple(row[0] for row in rows),
-            pool(np.array([row[1] for row in rows]), np.array([row[2] for row in rows])),
+            tuple(row[0] for row in told),
+            pool(np.array([row[1] for row in told]), np.array([row[2] for row in told])),
         )
-        for (factor, level), rows in sorted(found.items())
-        if len({row[0].person for row in rows}) > 1
+        for (factor, level), told in sorted(found.items())
+        if len({row[0].person for row in told}) > 1
     ]
 
 
@@ -211,14 +208,6 @@ def _left(own: list[PlateEvidence], columns: Array) -> tuple[Array, float, int]:
     value = np.array([one.value for one in own])
     beta = np.linalg.lstsq(columns, value, rcond=None)[0]
     return beta, float(np.sum((value - columns @ beta) ** 2)), len(own) - columns.shape[1]
-
-
-def _pooled_scatter(visits: list[list[PlateEvidence]], bases: Mapping[str, str]) -> float:
-    """Return the variance of one trial about its visit and conditions, over all visits."""
-    rows = [_left(own, _dummies(own, bases)[0])[1:] for own in visits]
-    free = sum(row[1] for row in rows)
-    known = float(np.median([one.sd**2 for own in visits for one in own]))
-    return max(known, sum(row[0] for row in rows) / free) if free else known
 
 
 def _differences(

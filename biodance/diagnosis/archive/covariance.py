@@ -41,13 +41,6 @@ class Groups:
         return _sums(self.person, self.persons.size)
 
 
-def rows_grouped(visit: NDArray[np.intp], person: NDArray[np.intp]) -> Groups:
-    """Return the groups of rows with ``visit`` and ``person`` (n,); a visit is of one person."""
-    visits, first, own = np.unique(visit, return_index=True, return_inverse=True)
-    persons, whose = np.unique(person[first], return_inverse=True)
-    return Groups(own, whose, visits, persons)
-
-
 def _sums(index: NDArray[np.intp], count: int) -> csr_array:
     return csr_array((np.ones(index.size), (index, np.arange(index.size))), shape=(count, index.size))
 

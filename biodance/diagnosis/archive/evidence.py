@@ -31,7 +31,6 @@ _AGAIN = 0.001
 _SHORTEST = 1.5
 """s of quiet standing from which on its mean horizontal force is used."""
 AXES = "xyz"
-_TOGETHER = "all steps"
 _ROUND = 0.02
 """m to which the sides of a plate are rounded, to know it again."""
 
@@ -71,7 +70,7 @@ def plate_evidence(
             found += of_steps(seen, visit, kind, labels)
             unknown = {labels[plate.name] for plate in trial.plates if not plate.placed}
             rows += [row for row in step_rows(seen, labels) if row.plate not in unknown]
-    return (*found, *placed(rows, visit, _TOGETHER))
+    return (*found, *placed(rows, visit, "all steps"))
 
 
 def plate_label(plate: Plate) -> str:
@@ -100,9 +99,7 @@ def plainly_named(observations: Sequence[PlateEvidence]) -> tuple[PlateEvidence,
 
 
 def _of_visit(trials: Sequence[Trial]) -> dict[str, float]:
-    """Return what each plate reads vertically without load in a visit, N: the middle of the trials that saw it empty;
-    plates that none saw empty are left out.
-    """
+    """Return what each plate that was seen empty in a visit then reads vertically, N: the middle of its trials."""
     seen: dict[str, list[float]] = {}
     for trial in trials:
         for plate in trial.plates:
@@ -128,19 +125,9 @@ def _of_empty(plate: Plate, trial: Trial, visit: PlateVisit, kind: Mapping[str, 
     reads = _empty(plate)
     if reads is None:
         return []
-    taken = plate.tared or float(np.abs(reads).max()) < _WEIGHS
+    taken, share = plate.tared or float(np.abs(reads).max()) < _WEIGHS, {plate_label(plate): 1.0}
     return [
-        PlateEvidence(
-            f"offset_{axis}",
-            {plate_label(plate): 1.0},
-            float(value),
-            _WEIGHS,
-            visit,
-            trial.name,
-            kind,
-            "empty plate",
-            taken,
-        )
+        PlateEvidence(f"offset_{axis}", share, float(value), _WEIGHS, visit, trial.name, kind, taken)
         for axis, value in zip(AXES, reads, strict=True)
     ]
 
@@ -160,10 +147,9 @@ def _of_standing(
         mean = np.sum([plate.wrench.force.mean(axis=0) for plate in on], axis=0)
         # Mean force = m (v1 - v0) / T: two independent speeds, hence sqrt(2).
         sd = float(np.hypot(_WEIGHS, np.sqrt(2) * weighed * _SWAY_SPEED / min(seconds, _LONGEST)))
+        share = dict.fromkeys(unknown, 1.0)
         found += [
-            PlateEvidence(
-                f"offset_{axis}", dict.fromkeys(unknown, 1.0), float(value), sd, visit, trial.name, kind, "standing"
-            )
+            PlateEvidence(f"offset_{axis}", share, float(value), sd, visit, trial.name, kind)
             for axis, value in zip(AXES[:2], mean[:2], strict=True)
         ]
     if np.isfinite(mass):
@@ -185,7 +171,7 @@ def _weighed(
     """Return what the plates weigh against what was declared."""
     if unknown:
         value, share = (weighed - mass) * trial.settings.gravity, dict.fromkeys(unknown, 1.0)
-        return PlateEvidence("offset_z", share, value, _WEIGHS, visit, trial.name, kind, "weight")
+        return PlateEvidence("offset_z", share, value, _WEIGHS, visit, trial.name, kind)
     vertical = np.array([plate.wrench.force[:, 2].mean() for plate in on])
     share = {plate_label(plate): float(part) for plate, part in zip(on, vertical / vertical.sum(), strict=True)}
-    return PlateEvidence("gain", share, weighed / mass - 1, _AGAIN, visit, trial.name, kind, "weight")
+    return PlateEvidence("gain", share, weighed / mass - 1, _AGAIN, visit, trial.name, kind)

@@ -227,9 +227,7 @@ def _card(
 
 
 def _follows(change: Change, others: tuple[Change, ...]) -> bool:
-    """Return whether a change of place follows from one of the delay at the same date: a late pressure lags behind the
-    foot that rolls on.
-    """
+    """Return whether a change of place follows from one of the delay: a late pressure lags behind the foot."""
     if not change.quantity.startswith("place"):
         return False
     late = [one for one in others if one.quantity == "delay" and one.matters]

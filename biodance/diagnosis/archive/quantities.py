@@ -53,8 +53,6 @@ class PlateEvidence:
         Its name.
     conditions : mapping
         What the trial was (``surface`` -> ``Foam``), where trials of one visit differ in it.
-    witness : str
-        What saw it.
     taken_off : bool
         The reader saw it on the empty plate and subtracted it: results do not suffer.
     """
@@ -66,7 +64,6 @@ class PlateEvidence:
     visit: PlateVisit
     trial: str
     conditions: Mapping[str, str] = field(default_factory=dict)
-    witness: str = ""
     taken_off: bool = False
 
     def __post_init__(self) -> None:

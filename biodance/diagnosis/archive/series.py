@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from biodance.diagnosis.archive.covariance import Groups, Projection, RowCovariance, rows_grouped
+from biodance.diagnosis.archive.covariance import Groups, Projection, RowCovariance
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
 from biodance.uncertainty.session_noise import NORMAL_OVER_MEDIAN
@@ -24,7 +24,6 @@ _DOUBT = 1.0
 """Standard deviation of the logarithm of a typical size."""
 _ONE_PLATE = 0.5
 """Share of the typical size that one plate has for itself."""
-_FAR, _ROUNDS = 2.0, 8
 _QUIETEST = 0.02
 """Share of the typical size below which no error is believed: files may hold forces that software set to zero."""
 
@@ -46,8 +45,10 @@ class Series:
 
     @cached_property
     def groups(self) -> Groups:
-        """Which rows belong together."""
-        return rows_grouped(self.visit, self.person)
+        """Which rows belong together; a visit is of one person."""
+        visits, first, own = np.unique(self.visit, return_index=True, return_inverse=True)
+        persons, whose = np.unique(self.person[first], return_inverse=True)
+        return Groups(own, whose, visits, persons)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +95,7 @@ def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tupl
 
 
 def _scatter(groups: list[list[PlateEvidence]]) -> float:
-    """Return by how many of its own standard deviations a trial differs from its visit's others, at least 1; a few
-    trials that are plainly wrong do not count.
-    """
+    """Return by how many of its standard deviations a trial differs from its visit's others (median), at least 1."""
     found = [np.empty(0)]
     for some in groups:
         if len(some) > 1:
@@ -113,9 +112,9 @@ def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[flo
     """
     value, sd = np.array([one.value for one in some]), scatter * np.array([one.sd for one in some])
     mean, weight = float(np.median(value)), sd**-2
-    for _ in range(_ROUNDS):
-        # Huber's weight: falls with 1 / |r| beyond `_FAR`.
-        weight = sd**-2 * np.minimum(1.0, _FAR / np.maximum(np.abs(value - mean) / sd, 1e-12))
+    for _ in range(8):
+        # Huber's weight: falls with 1 / |r| beyond two standard deviations.
+        weight = sd**-2 * np.minimum(1.0, 2.0 / np.maximum(np.abs(value - mean) / sd, 1e-12))
         mean = float(weight @ value / weight.sum())
     return mean, max(float(weight.sum() ** -0.5), _QUIETEST * PLATE_QUANTITIES[quantity].typical)
 

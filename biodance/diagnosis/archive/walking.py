@@ -22,9 +22,7 @@ _BLIND = 0.03
 _UNKNOWN = 0.3
 """m: what is known of a plate's place before any step."""
 _TAIL, _ROUNDS = 4.0, 15
-"""Degrees of freedom of a step's own error, as in `diagnosis.witness_fit`: one step in twenty is odd."""
-_OWN = "person "
-"""Beginning of the names of what all steps of a person share."""
+"""Degrees of freedom of a step's own error, as in `inference.scales`: one step in twenty is odd."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +55,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
                     column,
                     one.value - one.expected,
                     one.sd,
-                    {name: size for name, size in one.norms.items() if name.startswith(_OWN)},
+                    {name: size for name, size in one.norms.items() if name.startswith("person ")},
                 )
                 for one, column in zip(own, np.column_stack(shifts), strict=True)
             ]
@@ -94,7 +92,7 @@ def plate_places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
 def placed(rows: Sequence[StepRow], visit: PlateVisit, trial: str) -> list[PlateEvidence]:
     """Return the places that the steps of a visit know as evidence, named after ``trial``."""
     return [
-        PlateEvidence(f"place_{axis}", {plate: 1.0}, float(place[i]), float(error[i]), visit, trial, {}, "steps")
+        PlateEvidence(f"place_{axis}", {plate: 1.0}, float(place[i]), float(error[i]), visit, trial)
         for plate, (place, error) in (plate_places(rows) if rows else {}).items()
         for i, axis in enumerate("xy")
         if error[i] < _BLIND
@@ -116,7 +114,7 @@ def of_steps(
             *_mean("gain", [one for one in own if one.observer == _WEIGHT], relative=True),
         ):
             name = seen.trial.name
-            out.append(PlateEvidence(quantity, {labels[plate]: 1.0}, value, sd, visit, name, kind, "steps"))
+            out.append(PlateEvidence(quantity, {labels[plate]: 1.0}, value, sd, visit, name, kind))
     return out
 
 

@@ -125,9 +125,7 @@ def turned_wrists(markers: Markers, worn: MarkerSet, others: Iterable[Markers]) 
 
 
 def _believes_in_backs(markers: Markers, worn: MarkerSet, side: str) -> bool:
-    """Return whether a trial shows the back of the hand, or somebody who travels with the thumb rather behind, which
-    nobody does.
-    """
+    """Return whether a trial shows the back of the hand, or somebody who travels with the thumb rather behind."""
     back = middle(back_of_hand(markers, side))
     bars = _bars(markers, worn) if back < -BACK_OF_HAND and travels(markers) else {}
     return back > BACK_OF_HAND or (side in bars and bool(bars[side][0] < _RATHER_BACKWARDS))

@@ -4,8 +4,8 @@ The author of an effect writes its parameters and ONE of two methods; the other 
 
 - linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench;
   ``transform`` adds them;
-- otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central
-  difference at zero.
+- otherwise: ``transform(case, theta)``, the case that this cause would have produced, or only the wrench ``added``;
+  ``columns`` is its central difference at zero.
 
 What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a
 size by themselves). One that comes and goes within a trial is a `Transient`. Causes that are found by a check instead
@@ -162,15 +162,18 @@ class Effect(Checked):
         return np.stack([(self.added(case, s) - self.added(case, -s)) / (2 * s.max()) for s in steps], axis=2)
 
     def transform(self, case: Case, theta: Array) -> Case:
-        """Return the case that this cause of size ``theta`` (p,) would have produced."""
-        if type(self).columns is Effect.columns:
+        """Return the case that this cause of size ``theta`` (p,) would have produced: what it ``added`` on its plate,
+        the first of several for a cause that is on none.
+        """
+        kind, size = type(self), np.asarray(theta, dtype=float)
+        if kind.added is not Effect.added:
+            return case.with_added(self.plate_of(case), self.added(case, size))
+        if kind.columns is Effect.columns:
             raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
-        return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
+        return case.with_added(self.plate_of(case), self.columns(case) @ size)
 
     def added(self, case: Case, theta: Array) -> Array:
-        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is
-        quicker.
-        """
+        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench."""
         return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
 
     def marker_columns(self, case: Case) -> Array | None:
@@ -265,11 +268,6 @@ class ChannelEffect(Effect, ABC):
         # One channel about the plate's centre; a force there has a moment about the lab origin.
         only = self.in_channel(case)[:, None] * np.eye(6)[self.channel]
         return wrench_about_origin(only, self.plate_of(case).centre)[:, :, None]
-
-
-def axis_vector(target: str) -> Array:
-    """Return the unit vector (3,) of the axis that a target ends with."""
-    return np.eye(3)["xyz".index(target[-1])]
 
 
 class Transient(Effect, ABC):

@@ -53,7 +53,6 @@ _BETTER = 0.16
 trials: 0.00 to 0.06 where names are exchanged, 0.3 and more elsewhere)."""
 _SOME = 60
 """Worst frames, and as many spread over the trial, in which all names are tried."""
-_ROUNDS = 6
 
 
 def exchanged_labels(
@@ -91,7 +90,9 @@ def _wrists(
     if follow is None:
         seen = {*turned_wrists(markers, worn, others)}
     else:
-        seen = {pair for pair in follow if _is_wrist(pair) and not _tells(markers, pair)}
+        # Where a finger's marker lies clearly on one side of the wrist, it decides alone.
+        unsure = [side for side in "LR" if not abs(middle(back_of_hand(markers, side))) > BACK_OF_HAND]
+        seen = {(f"{side}WRA", f"{side}WRB") for side in unsure} & {*follow}
     whole = _uncontradicted(markers, static, worn, seen)
     parts: dict[Pair, Spans] = {}
     for reference in (static, markers) if static is not None else (markers,):
@@ -121,11 +122,9 @@ def _on_a_person(markers: Markers) -> bool:
 
 
 def _by_shape(markers: Markers, reference: Markers, worn: MarkerSet) -> Iterator[tuple[Pair, Spans]]:
-    """Yield the pairs under whose exchange the distances within rigid groups are those of a ``reference``, and when:
-    the exchange that explains most first, then what is left.
-    """
+    """Yield the pairs whose exchange gives rigid groups the shape of a ``reference``, and when; the best first."""
     groups = rigid_groups(markers, reference, worn)
-    for _ in range(_ROUNDS):
+    for _ in range(6):
         pairs, spans = _best_exchange(markers, groups)
         if not pairs:
             return
@@ -134,9 +133,7 @@ def _by_shape(markers: Markers, reference: Markers, worn: MarkerSet) -> Iterator
 
 
 def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tuple[Pair, ...], Spans]:
-    """Return the pairs that explain most if exchanged together, and when; () where none do, or others explain it
-    nearly as well.
-    """
+    """Return the pairs that explain most if exchanged together, and when; () where others do nearly as well."""
     every = _misfits(markers, np.arange(markers.time.size))
     named = {one: every(one, {}) for one in groups}
     # A misfit is a sum of squares: n markers at an RMS of `_MISFIT`.
@@ -168,9 +165,7 @@ def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tu
 
 
 def _better(markers: Markers, groups: tuple[RigidGroup, ...], best: tuple[Pair, ...], other: tuple[Pair, ...]) -> bool:
-    """Return whether the ``best`` exchange leaves clearly less than an ``other`` of the groups that one of them
-    touches, where the best one explains something.
-    """
+    """Return whether the ``best`` exchange leaves clearly less of the groups that either touches than an ``other``."""
     frames = np.linspace(0, markers.time.size - 1, 4 * _SOME).astype(int)
     better, _, _ = _explained(_misfits(markers, frames), groups, best)
     labels = {*_other_names(best), *_other_names(other)}
@@ -185,9 +180,7 @@ def _better(markers: Markers, groups: tuple[RigidGroup, ...], best: tuple[Pair, 
 def _candidates(
     markers: Markers, groups: tuple[RigidGroup, ...], wrong: list[RigidGroup]
 ) -> Iterator[tuple[Pair, ...]]:
-    """Yield what may be exchanged so that groups that look ``wrong`` are right: one or two pairs of one group, one pair
-    with a group beside it, one, two or all left and right partners of a group.
-    """
+    """Yield what may be exchanged so that groups that look ``wrong`` are right: pairs within, beside and across."""
     partners = [alphabetical(pair) for pair in sides(markers.names)]
     seen = set()
     for group in wrong:
@@ -207,9 +200,7 @@ _Misfit = Callable[[RigidGroup, Mapping[str, str]], Array]
 
 
 def _misfits(markers: Markers, frames: Index) -> _Misfit:
-    """Return `RigidGroup.misfit` in some ``frames``, computed once for every order of the labels of a group: most
-    candidates share them.
-    """
+    """Return `RigidGroup.misfit` in some ``frames``, computed once for every order of a group's labels."""
     known: dict[tuple[RigidGroup, tuple[str, ...]], Array] = {}
 
     def misfit(group: RigidGroup, other: Mapping[str, str]) -> Array:
@@ -224,9 +215,7 @@ def _misfits(markers: Markers, frames: Index) -> _Misfit:
 def _may_explain(
     misfit: _Misfit, apart: Array, names: Sequence[str], groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]
 ) -> bool:
-    """Return whether groups can fit clearly better with ``pairs`` exchanged, in frames enough, by how far markers are
-    ``apart`` (n, M, M) m alone: most candidates cannot.
-    """
+    """Return whether distances ``apart`` (n, M, M) m alone let groups fit clearly better with ``pairs`` exchanged."""
     other = _other_names(pairs)
     touched = [one for one in groups if other.keys() & set(one.labels)]
     named = np.sum([misfit(one, {}) for one in touched], axis=0)
@@ -236,9 +225,7 @@ def _may_explain(
 
 
 def _explained(misfit: _Misfit, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...]) -> tuple[Mask, Mask, Array]:
-    """Return in which frames of a ``misfit`` the groups that ``pairs`` touch fit clearly better with these exchanged
-    (n,), where that can be told (n,), and by how many m² (n,).
-    """
+    """Return where (n,) groups fit clearly better with ``pairs`` exchanged, where that is known, and by how many m²."""
     other = _other_names(pairs)
     touched = [one for one in groups if other.keys() & set(one.labels)]
     named = np.sum([misfit(one, {}) for one in touched], axis=0)
@@ -255,9 +242,7 @@ def _other_names(pairs: Iterable[Pair]) -> dict[str, str]:
 
 
 def _on_other_side(markers: Markers, right: Array, worn: MarkerSet) -> Iterator[tuple[Pair, Spans]]:
-    """Yield the pairs of left and right markers on pelvis and shoulders that are exchanged in a part of a trial: no
-    movement brings them there.
-    """
+    """Yield the pairs on pelvis and shoulders that lie on each other's side in a part of a trial, and when."""
     places = [f"{side}_{place}" for side in ("left", "right") for place in ("asis", "psis", "acromion")]
     match, there = worn.match(markers.names), {label for place in places for label in marking(worn, [place])}
     rigid = {match[label] for label in there if label in match}
@@ -268,9 +253,7 @@ def _on_other_side(markers: Markers, right: Array, worn: MarkerSet) -> Iterator[
 
 
 def _turned_hands(markers: Markers, reference: Markers) -> Iterator[tuple[Pair, Spans]]:
-    """Yield the wrists whose finger's marker lies as far towards the palm as it lies on the back of the hand in a
-    ``reference``, and when.
-    """
+    """Yield the wrists whose finger's marker is `mirrored` from where a ``reference`` has it, and when."""
     for side in "LR":
         pair, back = (f"{side}WRA", f"{side}WRB"), back_of_hand(markers, side)
         turned = mirrored(back, middle(back_of_hand(reference, side)))
@@ -278,21 +261,10 @@ def _turned_hands(markers: Markers, reference: Markers) -> Iterator[tuple[Pair, 
             yield pair, spans
 
 
-def _is_wrist(pair: Pair) -> bool:
-    return pair in {(f"{side}WRA", f"{side}WRB") for side in "LR"}
-
-
-def _tells(markers: Markers, pair: Pair) -> bool:
-    """Return whether a finger's marker lies clearly on one side of the wrist of a ``pair``."""
-    return bool(abs(middle(back_of_hand(markers, pair[0][:1]))) > BACK_OF_HAND)
-
-
 def _uncontradicted(
     markers: Markers, static: Markers | None, worn: MarkerSet, seen: Iterable[Pair]
 ) -> dict[Pair, Spans]:
-    """Return those of the pairs ``seen`` in the whole trial whose exchange makes no rigid group worse than noise:
-    against the static trial, else against its own median shape.
-    """
+    """Return the pairs ``seen`` whose exchange in the whole trial makes no rigid group worse than noise."""
     whole: Spans = ((0, markers.time.size),)
     left = {alphabetical(pair): whole for pair in seen if set(pair) <= set(markers.names)}
     frames = np.unique(np.linspace(0, markers.time.size - 1, 2 * _SOME).astype(int))
@@ -351,9 +323,7 @@ def exchange_spans(markers: Markers, pairs: Iterable[Pair], wrong: Mask, told: M
 
 
 def _changes(markers: Markers, pairs: Iterable[Pair]) -> Array:
-    """Return (T + 1,) 1 where markers move less from one frame to the next if they change their names between the two,
-    0 where they move more, NaN where that is not seen, as before the first and behind the last frame.
-    """
+    """Return (T + 1,) 1 where markers go less if they change their names there, 0 where more, NaN where unseen."""
     ways = np.zeros(markers.time.size + 1)
     ways[[0, -1]] = np.nan
     for one, other in ((markers[a], markers[b]) for a, b in pairs):
@@ -365,9 +335,7 @@ def _changes(markers: Markers, pairs: Iterable[Pair]) -> Array:
 
 
 def _changed_at(changes: Array, end: int) -> int | None:
-    """Return the frame near the ``end`` of a span at which the markers change places, the end itself where that is not
-    seen; None where they do not.
-    """
+    """Return the frame near an ``end`` at which markers change places; the end where unseen; None without."""
     first = max(end - _NEAR, 0)
     near = changes[first : end + _NEAR + 1]
     there = np.flatnonzero(near == 1)

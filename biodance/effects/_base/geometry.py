@@ -6,7 +6,7 @@ all causes.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
-from biodance.effects._base.moved_geometry import MovedMatter, PostureSensitivity, centres_of, moved_matter, wrench_of
+from biodance.effects._base.moved_geometry import PostureSensitivity, centres_of, moved_matter, wrench_of
 from biodance.lab.prepare import LowPass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
+from biodance.uncertainty.sources import joint_of
 
 _RATE = 25.0
 """Hz, at least, of the frames in which the sensitivity is computed."""
@@ -94,11 +95,6 @@ class Geometry:
         """Only what serves on: what was needed to find it is some ten times as large."""
         return GeometryChanges(self.marker_changes, self.joint_changes, self.phi)
 
-    @property
-    def _few(self) -> slice:
-        """The frames over which mean marker residuals are taken."""
-        return slice(None, None, max(1, len(self.time) // MEANS))
-
     def _wrench(self, nine: Array) -> NDArray[np.float32]:
         return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.sensitivity.body.gravity)
 
@@ -107,7 +103,7 @@ class Geometry:
         model's markers move by ``moved`` of some frames, (f, K, 3, P) m, at fixed posture and the posture changes by
         ``posture`` (F, nv, P).
         """
-        few = np.arange(len(self.time))[self._few]
+        few = np.arange(0, len(self.time), max(1, len(self.time) // MEANS))
         # Weights of the time mean: frames are not evenly spaced at the ends.
         lasting = self.seen[few] * np.gradient(self.time)[few, None]
         share = lasting / np.maximum(lasting.sum(axis=0), 1e-12)
@@ -178,7 +174,8 @@ def geometry(
     m; ``smoothed`` the motion's low-pass.
     """
     every = _frames(motion.time.size, motion.rate)
-    pose = _poses(poses, every)
+    pose = Poses(*(getattr(poses, one.name)[every] for one in fields(poses)))
+    moving = SegmentMotion(*(getattr(segments, one.name)[every] for one in fields(segments)))
     segment = tuple(body.markers.segment[c] for c in columns)
     markers = pose.points(list(segment), body.markers.position[list(columns)])
     measured = measured[every]
@@ -194,13 +191,16 @@ def geometry(
     place, turn = jacobian(body, pose, links, com)
     shape = (len(com), len(links), 3, body.nv)
     speed = (place @ _tangent_speed(body, motion, pose, every)[..., None]).reshape(shape[:3])
-    parts = moved_matter(_move(segments, every), phi, speed)
+    # P, Q, S per metre and per radian of every segment.
+    by_place, by_turn = moved_matter(moving, phi, speed)
+    flat = (len(place), 9, -1)
     return Geometry(
         motion.time[every],
         motion.time,
         sensitivity,
-        _by_posture(parts, place, turn),
-        parts.by_place,
+        # dP, dQ, dS through displacements and turns: two matrix products over the segments.
+        by_place.reshape(flat) @ place + by_turn.reshape(flat) @ turn,
+        by_place,
         turn.reshape(shape),
         seen,
         phi,
@@ -215,13 +215,6 @@ def _frames(count: int, rate: float) -> Index:
     return np.flatnonzero(chosen)
 
 
-def _by_posture(parts: MovedMatter, place: Array, turn: Array) -> Array:
-    """Return P, Q, S (F, 9, nv) per unit of every coordinate."""
-    frames = len(place)
-    # dP, dQ, dS through displacements and turns: two matrix products over the segments.
-    return np.asarray(parts.by_place.reshape(frames, 9, -1) @ place + parts.by_turn.reshape(frames, 9, -1) @ turn)
-
-
 def _tangent_speed(body: Body, motion: Motion, pose: Poses, every: Index) -> Array:
     """Return the velocity (F, nv) in the lab-frame tangent."""
     v = np.array(motion.v[every])
@@ -231,20 +224,6 @@ def _tangent_speed(body: Body, motion: Motion, pose: Poses, every: Index) -> Arr
     return v
 
 
-def _poses(pose: Poses, every: Index) -> Poses:
-    return Poses(*(getattr(pose, name)[every] for name in Poses.__dataclass_fields__))
-
-
-def _move(move: SegmentMotion, every: Index) -> SegmentMotion:
-    return SegmentMotion(*(getattr(move, name)[every] for name in SegmentMotion.__dataclass_fields__))
-
-
-def joint_name(body: Body, chain: tuple[int, ...]) -> str:
-    """Return the name of an anatomical joint: ``right_hip`` of ``right_hip_flexion`` ...; of a lone joint its own."""
-    name = body.joints[chain[0]].name
-    return name.rpartition("_")[0] or name
-
-
 def joint_chains(body: Body) -> dict[str, tuple[int, ...]]:
     """Return the anatomical joints by name, each with its axes from the parent outwards."""
-    return {joint_name(body, chain): chain for chain in chains(body)}
+    return {joint_of(body, chain): chain for chain in chains(body)}

@@ -15,7 +15,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import LowPass, low_pass, motion_filter
 from biodance.motion.dynamics import wrench_of_segments
@@ -29,6 +29,14 @@ _RATE = 25.0
 
 _SLACK = 0.05
 """Weight of markers that are not to be relied on, as a share of their own."""
+
+
+def angle_and_beyond(typical: float, source: str, *, least: float) -> tuple[Parameter, Parameter]:
+    """Return the parameters of a joint that turns by a ``typical`` angle (rad rms per axis), as a ``source`` says: the
+    angle, of which ``least`` matters, and what the wrench shows beyond it.
+    """
+    half = "half the angle: where the joint lies and what hangs on it is known to a half"
+    return Parameter("angle", "rad", typical, source, least=least), Parameter("beyond", "rad", typical / 2, half)
 
 
 class MissingJoint(Effect, ABC):
@@ -178,16 +186,14 @@ def _tracked(case: Case, body: Body) -> Movement:
     guess = np.insert(slow.q, new - np.arange(new.size), 0.0, axis=1)
     time = slow.markers.time
     loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
+    angles = loose.q[:, new]
+    # Root mean square about their means.
     angle, own = (
-        _rms(x) for x in (loose.q[:, new], _not_following(loose.q[:, new], loose.q[:, _unplaced(case, body)]))
+        float(np.sqrt(one.var(axis=0).mean()))
+        for one in (angles, _not_following(angles, loose.q[:, _unplaced(case, body)]))
     )
     nearer = _markers(case, body, loose.q, slow.q)
     return Movement(time, body, segment_motion(body, loose), slow.segments, nearer, angle, own)
-
-
-def _rms(angles: Array) -> float:
-    """Return the root mean square of ``angles`` (F, n) about their means."""
-    return float(np.sqrt(angles.var(axis=0).mean()))
 
 
 def _unplaced(case: Case, body: Body) -> list[int]:

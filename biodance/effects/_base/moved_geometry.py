@@ -136,9 +136,7 @@ class PostureSensitivity:
         return table
 
     def _held(self) -> NDArray[np.bool_]:
-        """Return (nv,) True where a joint rests against a limit for most of the trial: single frames would only make
-        the answer jump.
-        """
+        """Return (nv,) True where a joint rests against a limit for most of the trial, not in single frames."""
         # Gradient of the cost by each angle: J' w (p - m).
         slope = np.einsum("fkiv,fki->fv", self.tangent, self.apart)[:, self.body.n_root :]
         low, high = self.angles <= self.body.limits.lower + AT_LIMIT, self.angles >= self.body.limits.upper - AT_LIMIT
@@ -195,17 +193,9 @@ _TOGETHER = 24
 """Changes of the geometry that are filtered and differentiated together: little memory, however many there are."""
 
 
-@dataclass(frozen=True, eq=False)
-class MovedMatter:
-    """F frames of N segments: ``by_place``, ``by_turn`` (F, 9, N, 3): P, Q, S per metre and radian of each segment."""
-
-    by_place: Array
-    by_turn: Array
-
-
-def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
-    """Return the map of segments that move as ``move`` with the parameters ``phi`` (10N,); ``speed`` (F, N, 3) m/s
-    of their CoM.
+def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> tuple[Array, Array]:
+    """Return P, Q, S (F, 9, N, 3) per metre and per radian of each of N segments that move as ``move`` with the
+    parameters ``phi`` (10N,); ``speed`` (F, N, 3) m/s of their CoM.
     """
     table = phi.reshape(-1, 10)
     mass = table[:, 0]
@@ -226,7 +216,8 @@ def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
     place = np.stack([unit, heavy * skew(move.position + arm), -2 * heavy * skew(speed)], axis=1)
     # Rows P, Q, S per turn r: 0, I r, -(I w) x r - (w x I - I w x) r.
     turn = np.stack([np.zeros_like(central), central, -skew(spin) - (wheel @ central - central @ wheel)], axis=1)
-    return MovedMatter(*(np.moveaxis(part, 2, 3).reshape(len(part), 9, len(table), 3) for part in (place, turn)))
+    by_place, by_turn = (np.moveaxis(part, 2, 3).reshape(len(part), 9, len(table), 3) for part in (place, turn))
+    return by_place, by_turn
 
 
 def centres_of(phi: Array) -> Array:

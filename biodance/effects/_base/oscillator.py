@@ -34,9 +34,7 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
 
 @lru_cache(maxsize=64)
 def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Array, list[Array]]:
-    """Return numerators (2, 3), of place and speed, their denominator (3,), and the states in which both are at rest
-    under a constant acceleration of 1: the free mass, sampled.
-    """
+    """Return numerators (2, 3) of place and speed, denominator (3,), and the states at rest under unit acceleration."""
     from scipy.signal import cont2discrete, lfilter_zi, ss2tf
 
     w = 2 * np.pi * frequency

@@ -192,44 +192,28 @@ def unit_at(unit: str, target: str) -> str:
     return "1" if first == second else "m" if first == "N" else "1/m"
 
 
-Found = tuple[str, str, str]
-"""Target, the sentence, and the number in it ("" for none)."""
+def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[QualityCheck, ...]:
+    """Return a failed ``check`` for each target, or each size of it, on which the reader decided against the files,
+    with ``effect`` as its cause; of several trials, which name their own numbers, the first tells.
 
-
-def reader_decisions(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
-    """Return each different decision of a session once: ``patterns`` are regular expressions by what they speak of
-    (``corners``); a group in the expression is the number. The target is the plate's name and what, or only what.
+    ``patterns`` are regular expressions by what they speak of (``corners``); a group in the expression is the number.
+    The target is the plate's name and what, or only what.
     """
-    found: dict[tuple[str, str], Found] = {}
+    first: dict[tuple[str, str], str] = {}
     for trial in session.trials:
         said = [("", sentence) for sentence in (*trial.history, *trial.warnings)]
         said += [(plate.name, sentence) for plate in trial.plates for sentence in plate.decisions]
         for where, sentence in said:
+            plate = re.match(r"Plate (\d+)", sentence)
+            place = where or (f"plate{plate[1]}" if plate else "")
             for what, pattern in patterns.items():
-                match = re.search(pattern, sentence)
-                if match:
-                    place = where or _plate(sentence)
-                    target = f"{place}:{what}" if place else what
-                    found.setdefault((target, match[0]), (target, sentence, match[1] if match.groups() else ""))
-    return tuple(found.values())
-
-
-def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[QualityCheck, ...]:
-    """Return a failed ``check`` for each target, or each size of it, on which the reader decided against the files,
-    with ``effect`` as its cause; of several trials, which name their own numbers, the first tells.
-    """
-    first: dict[tuple[str, str], str] = {}
-    for target, sentence, number in reader_decisions(session, patterns):
-        first.setdefault((target, number), sentence)
+                if match := re.search(pattern, sentence):
+                    number = match[1] if match.groups() else ""
+                    first.setdefault((f"{place}:{what}" if place else what, number), sentence)
     return tuple(
         QualityCheck(check, False, sentence, effect, target, float(number) if number else float("nan"))
         for (target, number), sentence in first.items()
     )
-
-
-def _plate(sentence: str) -> str:
-    match = re.match(r"Plate (\d+)", sentence)
-    return f"plate{match[1]}" if match else ""
 
 
 def checks_of_defects(session: Session, effect: str, *, check: str, quantity: str) -> tuple[QualityCheck, ...]:
@@ -255,32 +239,26 @@ def marker_checks(recorded: Recorded, fault: MarkerFault, effect: str) -> tuple[
     has it. Preparing a trial takes these frames out (`prepare`), so the rest is judged.
     """
     found: dict[str, list[tuple[FaultyMarker, str]]] = {}
-    trials = recorded.once(_faulty)
-    for trial, markers, faults in trials:
+    for trial, markers, faults in (trials := recorded.once(_faulty)):
         for one in faults:
             if one.fault is fault:
                 found.setdefault(one.label, []).append((one, f"{trial.name} {one.when(markers.time)}"))
     check = f"{fault.value} markers"
     if not found:
         return (QualityCheck(check, True, f"No marker shows a {fault.value} frame."),) if trials else ()
-    return tuple(
-        QualityCheck(check, False, _said(places), effect, label, mended=True) for label, places in found.items()
-    )
+    checks = []
+    for label, places in found.items():
+        largest = replace(places[0][0], size=max(one.size for one, _ in places))
+        text = largest.sentence("; ".join(where for _, where in places))
+        checks.append(QualityCheck(check, False, text, effect, label, mended=True))
+    return tuple(checks)
 
 
 def _faulty(recorded: Recorded) -> list[tuple[Trial, Markers, tuple[FaultyMarker, ...]]]:
-    """Return the trials that have markers, with those of its set and their faults of every kind."""
-    trials = [(trial, _worn(trial)) for trial in recorded.session.trials if trial.markers is not None]
-    return [(trial, markers, faulty_markers(markers)) for trial, markers in trials]
-
-
-def _worn(trial: Trial) -> Markers:
-    """Return the markers of the trial's set, under the names that preparing gives them; all where no set is known."""
-    assert trial.markers is not None
-    return canonical(trial.markers, read_marker_set(trial.marker_set)) if trial.marker_set else trial.markers
-
-
-def _said(places: list[tuple[FaultyMarker, str]]) -> str:
-    """Return one sentence for a marker in several trials."""
-    size = max(one.size for one, _ in places)
-    return replace(places[0][0], size=size).sentence("; ".join(where for _, where in places))
+    """Return the trials that have markers, with those of its set (all without one) and their faults of every kind."""
+    found = []
+    for trial in recorded.session.trials:
+        if (markers := trial.markers) is not None:
+            worn = canonical(markers, read_marker_set(trial.marker_set)) if trial.marker_set else markers
+            found.append((trial, worn, faulty_markers(worn)))
+    return found

@@ -75,9 +75,7 @@ def rigid_groups(markers: Markers, reference: Markers, marker_set: MarkerSet) ->
 
 
 def _members(marker_set: MarkerSet) -> Iterator[tuple[str, ...]]:
-    """Yield the labels of the set that make one rigid group: of a limb's segment with the joint above it, the hand
-    apart from the forearm; of the pelvis; of the head.
-    """
+    """Yield the labels of each rigid group: a limb's segment with the joint above it, hand, pelvis, head."""
     on: dict[str, list[str]] = {}
     for marker in marker_set.markers:
         on.setdefault(marker.segment, []).append(marker.label)
@@ -109,9 +107,7 @@ def _often_seen(markers: Markers, label: str) -> bool:
 
 
 def _median_shape(points: Array) -> Array | None:
-    """Return the median (K, 3) m of a group's ``points`` (T, K, 3), all frames laid on one of them; None where they are
-    never seen together.
-    """
+    """Return the median (K, 3) m of ``points`` (T, K, 3), all frames laid on one; None if never seen together."""
     points = points[np.isfinite(points).all(axis=(1, 2))]
     if not len(points):
         return None
