@@ -50,8 +50,6 @@ TRIES = 3
 """Times that a session may lose its process before it is given up."""
 _AHEAD = 2
 """Tasks sent to a cluster for each of its threads: the second waits where the first is worked on."""
-_FRESH = 50
-"""Sessions after which a process is replaced, so that memory stays flat."""
 _ASKED = 0.2
 """s between two looks at whether somebody has stopped the work."""
 
@@ -148,7 +146,8 @@ def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
     prepare_workers()
     context = multiprocessing.get_context("forkserver")
-    return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
+    # a new process after 50 sessions keeps the memory flat
+    return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=50)
 
 
 def ready_process() -> ProcessPoolExecutor:

@@ -72,7 +72,6 @@ ForceOption = Annotated[
     Parameter(help="Write into a non-empty folder; overwrite existing files."),
 ]
 Tables = Annotated[Path | None, Parameter(help="Also write the results as tables (CSV and Parquet) to this folder.")]
-OpenOption = Annotated[bool, Parameter(name="--open", help="Open the report in a browser when done.")]
 OutOption = Annotated[Path, Parameter(help="Output folder; created if it does not exist.")]
 
 ReferenceOption = Annotated[
@@ -210,7 +209,7 @@ class Results:
 
     out: OutOption
     tables: Tables = None
-    open_page: OpenOption = False
+    open_page: Annotated[bool, Parameter(name="--open", help="Open the report in a browser when done.")] = False
     json: JsonOption = False
     force: ForceOption = False
 

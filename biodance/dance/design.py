@@ -192,9 +192,6 @@ def _without(search: WordSearch, course: Course, p: int, found: PerformersResult
     return replace(shorter, notes=(*course.notes, note))
 
 
-WORKERS = 2
-
-
 @one_thread()
 def design(
     body: Body,
@@ -219,7 +216,7 @@ def design(
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
     if workers is None:
-        with ProcessPoolExecutor(WORKERS) as pool:
+        with ProcessPoolExecutor(2) as pool:
             return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
     plan = plan.with_limits(limits)
     alone = DesignContext.alone(body, plan, seed)

@@ -201,10 +201,6 @@ def _danced() -> dict[str, Any]:
 
 
 _FELT = 1.0  # s: a hold that is judged alone says nothing more after this time
-_TRUST = 0.1
-"""Share of the information that disturbances leave where postures and moves are judged one by one: with it whole dances
-tell of every segment what is expected of them.
-"""
 _AT_REST = slice(2, 5)  # Components of a wrench (Fx, Fy, Fz, Mx, My, Mz) that a body at rest has
 
 
@@ -230,7 +226,8 @@ def movement_information(dance: Dance) -> MovementInformation:
     plan = dance.motion(JUDGED_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
     # Information of a coefficient: 1 / variance.
-    weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
+    # so much of it disturbances leave where postures and moves are judged one by one
+    weights = 0.1 / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened_prior(dance.body.sip).covariance)
     # V sqrt(lambda): a root of a covariance that may be singular.
     root = vector * np.sqrt(np.maximum(value, 0.0))

@@ -27,7 +27,6 @@ _RATE, _PLAN_RATE = 5.0, 25.0  # Hz at which performances are judged, and the pl
 _WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5  # Hz: how fast errors, tempo and sway change
 _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
-_PENDULUM = 0.1  # s²: height of the centre of mass over gravity
 _LIFT = 1.0  # Share of a move in which a foot leaves the ground, or comes back
 _FELT = 3.0
 """s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
@@ -154,7 +153,7 @@ class PlannedDance:
         parts = list[tuple[Array, Array, Array, Array]]()
         for rng, time, when, part in people:
             error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
-            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
+            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=0.1, part=part)
             parts.append((time[part], when[part], error, sway))
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)

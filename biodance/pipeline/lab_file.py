@@ -82,7 +82,6 @@ Positive = Annotated[float, Field(gt=0, le=1e6)]
 Finite = Annotated[float, Field(ge=-1e12, le=1e12)]
 _Row = Annotated[list[Finite], Field(min_length=6, max_length=6)]
 _Squares = Annotated[list[Annotated[float, Field(gt=0, le=1e12)]], Field(min_length=6, max_length=6)]
-_Words = Annotated[str, Field(max_length=10_000)]
 _PerCent = Annotated[list[float], Field(min_length=2, max_length=101)]
 
 
@@ -99,7 +98,7 @@ class _Instruments(_Table):
 
 
 class _Tolerances(_Table):
-    origin: _Words
+    origin: Annotated[str, Field(max_length=10_000)]
     movement: list[_Squares] = Field(max_length=100)
     noise: list[Annotated[list[_Row], Field(min_length=6, max_length=6)]] = Field(max_length=100)
     sizes: dict[str, Annotated[float, Field(ge=0, le=1e6)]] = {}

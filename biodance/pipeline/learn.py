@@ -200,10 +200,6 @@ def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     return found
 
 
-_FEWEST_LEGS = 6
-"""Healthy legs without which nothing is said of how far healthy people lie apart: both of three people."""
-
-
 @dataclass(frozen=True, eq=False)
 class MeasuredWalk:
     """How one ``person`` moved in a ``session``: ``curves`` over all good repetitions, ``beside`` those of plug-in
@@ -240,7 +236,8 @@ def healthy_reference(healthy: Sequence[MeasuredWalk], everybody: Sequence[Measu
             legs.setdefault((one.person, side), []).extend(rows)
     strides = [row for one in everybody for rows in one.vectors.values() for row in rows]
     # as many features (singular vectors) as that cannot be found in fewer strides
-    enough = len(strides) >= FEATURES and len(legs) >= _FEWEST_LEGS
+    # both of three people tell how far the healthy lie apart
+    enough = len(strides) >= FEATURES and len(legs) >= 6
     means = [np.mean(rows, axis=0) for rows in legs.values()]
     deviation = deviation_reference(np.stack(strides), np.stack(means)) if enough else None
     return HealthyReference(normal_curves(people), normal_curves(beside), deviation)
@@ -250,7 +247,6 @@ _WORTH = 5.0
 """Sessions that the shipped tolerances count for (docs/decisions/2026-11-22-a-laboratory-learns.md)."""
 FEWEST = 3
 """Sessions without which nothing is learned."""
-ROUNDS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,7 +411,7 @@ def learned_together(
             f"{FEWEST} are needed. {why}"
         )
     nulls, created = [one.null for one in sessions], now()
-    found = without_habits(learn_tolerances(nulls, shipped(), rounds=ROUNDS, worth=_WORTH))
+    found = without_habits(learn_tolerances(nulls, shipped(), rounds=10, worth=_WORTH))
     origin = (
         f"{len(sessions)} sessions of {archive.resolve().name}, {created[:10]}, beside the shipped sizes as "
         f"{_WORTH:g} sessions more"

@@ -47,8 +47,6 @@ from biodance.uncertainty.caution import widened_prior
 
 _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
-_RECENT = 0.25
-"""s of markers that are judged at once."""
 _SLOW = 10.0
 """Samples of the running posterior count as if only so many-th of them were independent: errors last about a second."""
 
@@ -143,7 +141,8 @@ class LiveSession:
         self._distance.append(distance)
         self._determined.append(determined)
         if (frame + 1) % self._hop == 0:
-            recent = np.array(self._distance[-max(3, round(_RECENT * self.markers.rate)) :])
+            # s of markers that are judged at once
+            recent = np.array(self._distance[-max(3, round(0.25 * self.markers.rate)) :])
             self._watch.look_at_markers(self._now, self._xyz[frame], recent)
         # a window is begun only when the one before is done: late work must not pile up
         if self._work is None and frame + 1 >= self._window and (frame + 1 - self._window) % self._hop == 0:

@@ -30,8 +30,6 @@ from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, elementary_rotation, quaternion_matrix, wrench_about_point
 
-_MISWEIGHED = 0.02
-"""Of its weight: by so much the identified robot may differ from what the plate carries."""
 _APART = 1.0
 """s: clocks further apart are said first."""
 
@@ -114,7 +112,8 @@ def misweighed(found: SessionIdentification) -> list[Attention]:
             f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
             f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
         )
-        out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > _MISWEIGHED * needed)
+        # of the weight
+        out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > 0.02 * needed)
     return out
 
 

@@ -268,7 +268,6 @@ GRADES = {"grade 5": 1.0, "grade 4": 0.6, "grade 3": 0.25}
 gravity.
 """
 _RIGHT_ANGLE = math.pi / 2
-_SEAT = (0.3, 1.2)  # m that a seat may be high
 _Ranges = list[tuple[str, float, float]]
 
 PLAIN_MOVEMENTS = {
@@ -387,7 +386,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
         tuple(_listed(path, raw, "hold_frame", "hand", SIDES)),
         bearing,
         _OVERHEAD in cannot,
-        _positive(path, raw, "seat_height_m", 0.0, legal=_SEAT),
+        _positive(path, raw, "seat_height_m", 0.0, legal=(0.3, 1.2)),  # m
         sentences(path, raw),
         _positive(path, raw, "rest_after_s", math.inf, legal=(LEAST_REST, math.inf)),
     )

@@ -37,7 +37,6 @@ _FREE = {
     "elbow_flexion": (10, 45, 75, 105),
 }
 """degrees: what free postures of an arm are drawn from; away from trunk and thighs."""
-_FREE_WORDS = 8
 _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
     ("lifted", "hanging"), ("hip", "knee", "ankle")
 )
@@ -205,7 +204,7 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     """Return free postures of an arm, on a grid of angles that can be called."""
     grid = list(product(*_FREE.values()))
-    chosen = sorted(int(k) for k in rng.choice(len(grid), _FREE_WORDS, replace=False))
+    chosen = sorted(int(k) for k in rng.choice(len(grid), 8, replace=False))
     out = []
     for number, k in enumerate(chosen, start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
@@ -283,10 +282,6 @@ def singular(text: str) -> str:
 
 _ROUNDS = 5  # Corrections of the pelvis; each leaves about a fifth of the error
 _BACK = 0.03  # m behind the middle of the support where people stand: over the arch of the foot
-_GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
-"""Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
-_ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
-"""rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
 _FROM_STOP = float(np.radians(3.0))  # rad that the joints of a holding arm keep from their stops
 _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
@@ -391,7 +386,7 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
                     knee[rows] = angle
                 elif (name := own_joint(part, joint)) in names:
                     x[rows, names[name]] = angle
-    for _ in range(_GRIPPED if stance.holding else 0):
+    for _ in range(2 if stance.holding else 0):
         x = _gripping(chain, stance, settled(chain, stance, x, knee))
     return settled(chain, stance, x, knee)
 
@@ -405,12 +400,13 @@ def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
         segment, local = palm(chain.body, SIDES[side])
         arm = chain.arm_columns[side]
         low, high = limits.lower[np.array(arm) - ROOT] + _FROM_STOP, limits.upper[np.array(arm) - ROOT] - _FROM_STOP
-        for _ in range(_STEPS):
+        for _ in range(12):
             place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
             # Away from the present angles towards the elbow's.
-            J, out = slope[:, 0][:, :, arm], np.array(_ELBOW_OUT) - x[:, arm]
+            # of shoulder flexion, adduction, rotation, elbow flexion: away from the trunk
+            J, out = slope[:, 0][:, :, arm], np.array(tuple(np.radians([0.0, -60.0, 40.0, 60.0]))) - x[:, arm]
             # Damped pseudoinverse J'(J J' + d 1)^-1.
-            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(3))
+            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + 1e-3 * np.eye(3))
             # out + J^+ (e - J out) = J^+ e + (1 - J^+ J) out: `out` acts in the null space of the palm's place.
             left = stance.hands[side] - place[:, 0] - np.einsum("sij,sj->si", J, out)
             step = np.einsum("sij,sj->si", inverse, left) + out

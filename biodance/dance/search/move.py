@@ -38,23 +38,13 @@ RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
-_ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
-"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
-of the rounds.
-"""
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
 _LITTLE = 0.01  # s·(rad/s²)², information on every inertia that is supposed before the first move
-HOPELESS = 0.5
-"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
-without the reserve on the coarse grid.
-"""
 
 
 SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
-DETOURS = 2
-"""Postures in between that are tried."""
 _SPARE = 0.5
 """Fraction of what a limit's check forgives (`Limit.rounding`) that a move may use: the check of the whole dance
 samples other instants of it.
@@ -193,7 +183,8 @@ def _logarithm(gram: Array) -> tuple[Array, Array]:
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     """Return the best feasible move after ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
-    for spread, share, rounds in _ATTEMPTS:
+    # spread (rad) about the straight move, share of excitation in the objective, iterations
+    for spread, share, rounds in ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12))):
         via = task.straight()
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
         for found, beyond in improving_moves(task, via, MoveObjective(task, history, share), rounds):
@@ -201,7 +192,7 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
                 best = found
             if best.violation == 0:
                 return best
-            if beyond > 0 or found.violation > HOPELESS:
+            if beyond > 0 or found.violation > 0.5:  # scales of violation
                 break
     assert best is not None
     return best
@@ -253,7 +244,7 @@ def exciting_move(task: Task, history: Array, seed: list[int]) -> Move:
         broken = direct.limit or _broken_limit(task, direct)
         if not broken:
             return direct
-    for attempt in range(DETOURS):
+    for attempt in range(2):  # postures in between that are tried
         try:
             stop = intermediate_posture(task.chain, task.stance, task.ends, task.limits, seed=[*seed, attempt]).x
         except BiodanceError:

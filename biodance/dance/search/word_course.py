@@ -101,11 +101,9 @@ class NoNextPosture(BiodanceError):
 
 _INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
 _TRIES = 200  # Postures that are taken or given up before a search is
-_NEXT_TRIED = 5  # Postures that are tried after another one before that one is given up
 _AT_ONCE = 12
 """Postures of which one that imprecise people surely can is taken before others that tell more."""
 _LIFTING = 1.4  # Times as long as others that a move takes in which a foot is lifted or put down
-_LOOKED_AT = 24  # Postures that tell most standing still, whose moves are judged, too
 
 
 @dataclass(eq=False)
@@ -159,7 +157,7 @@ class WordSearch:
             here = path[-1]
             if here.left is None:
                 broken = why.setdefault(number, {})
-                here.left = islice(self.possible(steps, stances, here.posterior, broken), _NEXT_TRIED)
+                here.left = islice(self.possible(steps, stances, here.posterior, broken), 5)
             found = next(here.left, None)
             if found is not None:
                 path.append(_Place(self.posterior_after(here.posterior, steps, found[0]), *found))
@@ -248,7 +246,7 @@ class WordSearch:
         # Variance removed per second.
         gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
-        first = list(islice(on, _LOOKED_AT))
+        first = list(islice(on, 24))  # those that tell most standing still
         gains = np.array([float(self.information.gains(posterior, self._rows(last, step))) for step in first])
         yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on

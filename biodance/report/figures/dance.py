@@ -33,14 +33,13 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = 10
-VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
-"""(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
 
 
 def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
     """Draw postures ``q`` (P, nq) in rows of ten, titled, to one scale; right is blue, left red and dashed."""
     lines, sides = bone_lines(body, poses(body, q))
-    flat = lines @ VIEW.T
+    # oblique, from the front and right: lab x, y, z to the page's right and up
+    flat = lines @ np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]]).T
     # each posture about its own middle, heights as they are
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
@@ -138,7 +137,6 @@ _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Title and horizontal direction of the eye."""
 _FINE = 2  # Times as fine a picture is drawn before it is made smaller, so that edges are smooth
 _INK = {"right": (0, 114, 178), "left": (213, 94, 0), "middle": (110, 120, 130)}
-_PALE = 0.55  # Share of white in the colours of the plan
 _FORMATS = (".gif", ".mp4")
 
 
@@ -223,7 +221,7 @@ def _pictures(seen: list[list[tuple[str, Array, Array]]], cop: Array, time: Arra
         image = empty.copy()
         draw = ImageDraw.Draw(image)
         for (title, _, eye), middle, parts in zip(titles, middles, placed, strict=True):
-            pale = _PALE if title == "planned" else 0.0
+            pale = 0.55 if title == "planned" else 0.0  # share of white
             for segment, outline, _ in sorted(parts, key=lambda one: float(one[2][t])):
                 red, green, blue = (round(one + pale * (255 - one)) for one in _INK[side_in_name(segment)])
                 draw.polygon(outline[t].ravel().tolist(), fill=(red, green, blue), outline="white")

@@ -55,7 +55,6 @@ _KEYS = Schema(
     "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
 )
 _FILE_KEYS = Schema("", shown=f"{_KEYS.shown} | plug-in gait right: {{file_right}} | left there: {{file_left}}")
-_PROFILE = Schema("", shown="score: {value} | right: {right} | left: {left}")
 
 
 def movement_section(moved: SessionMovement) -> str:
@@ -72,7 +71,7 @@ def movement_section(moved: SessionMovement) -> str:
             "strides": _STRIDES,
             "keys": _FILE_KEYS if beside else _KEYS,
             "file_angle": FILE_ANGLE_ROW,
-            "profile": _PROFILE,
+            "profile": Schema("", shown="score: {value} | right: {right} | left: {left}"),
         },
         parts=parts,
         **_scores(*moved.scores),

@@ -58,9 +58,6 @@ _KEY = Schema(
 )
 
 
-_SCORED = ("ours", "beside", "conventional")
-
-
 def gait_document(moved: SessionMovement | None) -> Row | None:
     """Return the gait of a session; None where nobody walks.
 
@@ -91,7 +88,9 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
         "curves_beside": _MEAN.rows(found.file_groups),
         "curves_conventional": _MEAN.rows(found.conventional_groups),
         "key_values": _KEY.rows(found.keys),
-        "scores": dict(zip(_SCORED, map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
+        "scores": dict(zip(("ours", "beside", "conventional"), map(_scores, moved.scores), strict=True))
+        if moved.scores[0]
+        else None,
     }
 
 
