@@ -230,11 +230,6 @@ class Results:
         say(f"No browser was found here. Open {page} on a machine that has one.")
 
 
-_COUNTED, _EVERY = re.compile(r"(?P<done>\d+) of (?P<all>\d+)"), 5.0
-"""How a message counts; s between two lines where stderr is no terminal: a short run says nothing, a long log is short.
-"""
-
-
 class TimeLeft:
     """Estimate of the time left in a stage from its progress messages ("3 of 11"); ``clock`` in s."""
 
@@ -243,7 +238,7 @@ class TimeLeft:
 
     def said(self, text: str) -> str:
         """Return the words with the time left in this stage, where they count its items."""
-        counted = _COUNTED.search(text)
+        counted = re.search(r"(?P<done>\d+) of (?P<all>\d+)", text)
         if counted is None:
             return text
         done, total = int(counted["done"]), int(counted["all"])
@@ -284,7 +279,7 @@ def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Calla
     def tell(text: str) -> None:
         nonlocal last
         line = left.said(text)
-        if clock() - last >= _EVERY:
+        if clock() - last >= 5.0:  # s: a short run says nothing, a long log is short
             last = clock()
             sys.stderr.write(f"{without_codes(line)}\n")
 
