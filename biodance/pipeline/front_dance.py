@@ -29,7 +29,7 @@ from biodance.virtual_lab.movement.performance import (
 )
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.simulate import check_simulated, write_visit
+from biodance.virtual_lab.simulate import check_simulated
 from biodance.virtual_lab.simulate import simulate_session as write_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
@@ -145,7 +145,8 @@ def simulate_dance(
         )
         return replace(done, forces=instruments.visit.forces)
 
-    return write_visit(subject, plan, out, performed, seed=seed, loads=loads, visit=visit, bent=_BENT if seated else {})
+    bent = _BENT if seated else {}
+    return write_session(subject, plan, out, seed=seed, loads=loads, visit=visit, performed=performed, bent=bent)
 
 
 def design_dance(

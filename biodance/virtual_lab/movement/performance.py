@@ -401,11 +401,7 @@ def _height(person: Person, pose: posing.Pose, curves: posing.Curves, stance: po
 
 
 def _reach(body: Body, turn: Array, xy: Array, ankle: dict[str, Array], raised: Array) -> tuple[Array, float]:
-    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the legs' length m.
-
-    A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning
-    body).
-    """
+    """Return the highest place (T,) m of a pelvis, and the legs' length m; a foot gives way as it rises."""
     tops, length = posing.leg_tops(body, turn, xy, ankle)
     # Soft minimum: -log(sum of exp(-k h)) / k; a raised foot is let go by metres.
     return -logsumexp(-SOFTNESS * (tops + AWAY * raised.T), axis=0) / SOFTNESS, length
