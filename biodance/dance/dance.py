@@ -114,9 +114,6 @@ def possible_array(name: str, array: Array) -> Array:
 
 
 _GIVE = "Give the dance.npz that biodance dance wrote, or its folder."
-_VERSION = 1
-_PERSON = ("mass", "stature", "sex", "age")
-"""What is kept of the person for whom a dance was designed; an unknown age is not."""
 
 
 _chain_of = lru_cache(maxsize=4)(Chain)
@@ -329,9 +326,9 @@ class Dance(Sendable):
         --------
         >>> dance.save("again.npz")
         """
-        words = {"biodance_dance": _VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
+        words = {"biodance_dance": 1, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
         if self.subject is not None:
-            who = {name: getattr(self.subject, name) for name in _PERSON}
+            who = {name: getattr(self.subject, name) for name in ("mass", "stature", "sex", "age")}
             words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
         words |= {"care": self.care, "rest": self.rest}

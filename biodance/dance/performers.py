@@ -78,9 +78,7 @@ def _noise(
 
 @lru_cache(maxsize=16)
 def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
-    """Return frequencies (F,) Hz up to 2.5 times the ``cutoff``, and their cosines and sines (T, F) at ``instants``
-    (T,) s, which all performers of a dance share.
-    """
+    """Return frequencies (F,) Hz, their cosines and sines (T, F) at ``instants`` (T,) s, the same for all."""
     time = np.frombuffer(instants)
     # Longer than the dance, so that no curve repeats itself in it.
     duration = 1.3 * (time[-1] - time[0]) + 1.0
@@ -168,9 +166,7 @@ class PlannedDance:
         return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
 
     def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
-        """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
-        centre of mass off by its ``sway`` m (T, 2).
-        """
+        """Return the plan at ``when``, off by ``error`` rad (T, n - 3) and ``sway`` m (T, 2)."""
         error = error.copy()
         for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
             error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
@@ -219,7 +215,6 @@ OF_PERFORMERS = "of_performers"
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
 _DRAWN = 96  # Imprecise copies of an instant that are looked at
-_TOGETHER = 1000  # Frames of performers that are looked at together
 _STILL = 1e-4  # Least deviation, in the limit's unit
 
 
@@ -285,9 +280,7 @@ def try_performers(
 def _rooms(
     dance: Dance, limits: tuple[Limit, ...], who: Sequence[int], only: tuple[int, ...], how: Imprecision
 ) -> dict[str, tuple[Array, list[str]]]:
-    """Return for every limit the least that each performer leaves on the way to and in every posture (K, P), infinite
-    where nobody looked, and where in the body that is least (K).
-    """
+    """Return the least that each performer leaves of every limit by posture (K, P), and where (K)."""
     people, asked = [_person(dance, k, only, how) for k in who], for_imprecise(limits)
     when = np.concatenate([when[part] for _, _, when, part in people])
     plan, room = PlannedDance(dance, (when.min(), when.max())), {limit.name: list[Array]() for limit in asked}
@@ -313,9 +306,7 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 
 
 def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _Person:
-    """Return performer ``k``, and the instants at which he or she dances to or in the postures ``only``, and two beyond
-    for differences.
-    """
+    """Return performer ``k``, and the instants of the dance to or in the postures ``only``."""
     time, when = draw_clock(np.random.default_rng([0, 7, k]), dance.duration, how)
     part = slice(None)
     if only:
@@ -328,7 +319,7 @@ def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _P
 def _groups(people: list[_Person]) -> Iterator[list[_Person]]:
     """Yield people who are looked at together: calls cost more than a few frames, and many frames need memory."""
     frames = np.cumsum([when[part].size for _, _, when, part in people])
-    for _, some in groupby(zip(frames // _TOGETHER, people, strict=True), key=itemgetter(0)):
+    for _, some in groupby(zip(frames // 1000, people, strict=True), key=itemgetter(0)):
         yield [one for _, one in some]
 
 

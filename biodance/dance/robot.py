@@ -56,8 +56,6 @@ def reposition(dance: Dance, plan: Plan) -> Dance:
 
 _LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
-_FORWARD = 2.0
-"""1/m: the right foot stands ahead by this times the plan's m times the leg's: 0.1 m, legs of 0.25 m (paper III.D)."""
 _LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
 
@@ -81,7 +79,8 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
             f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {_LIGHTEST:g} kg and more."
         )
     usual = float(np.median(body.limits.velocity))
-    ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
+    # 0.1 m ahead, of legs of 0.25 m (paper III.D)
+    ahead = float(np.clip(plan.forward * 2.0 * leg_length(body), 0.05, 0.4))
     free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0, "plate": None}
     if any(isinstance(limit, Balance) and limit.share == FOLLOWABLE_SHARE for limit in plan.limits):
         plan = plan.with_limits([Balance()])  # people have performers instead

@@ -15,7 +15,6 @@ from biodance.records import SIDES, Array
 
 AROUND = 0.025
 """m of plate around the soles: nobody stands exactly on the marks, and soles are known to about 1 cm."""
-_ROUNDING = 1e-9  # m
 
 
 def room_on_plates(stances: Iterable[Stance]) -> Array:
@@ -72,9 +71,7 @@ def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
 
 
 def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, float, Array]:
-    """Return ``wide`` and ``forward`` as near to the plan's as a ``plate`` asks for and is legal, and the room (2,) m
-    that the feet then need.
-    """
+    """Return ``wide`` and ``forward`` as near to the plan's as a ``plate`` asks for, and the room (2,) m."""
     over = np.maximum(_room(body, plan, plan.wide, plan.forward) - plate, 0.0)
     wide, forward = plan.wide, plan.forward
     if over[0] > 0:
@@ -86,7 +83,7 @@ def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, 
 
 
 def _fits(room: Array, plate: tuple[float, float]) -> bool:
-    return bool(np.all(room <= np.array(plate) + _ROUNDING))
+    return bool(np.all(room <= np.array(plate) + 1e-9))
 
 
 def _room(body: Body, plan: Plan, wide: float, forward: float) -> Array:

@@ -97,7 +97,6 @@ LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
 """Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
 LEAST_REST = 10.0
 """s of dancing, at least, before a rest."""
-_PLATE = (0.2, 3.0)  # m that a side of a plate, or of several that touch, may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +175,7 @@ class Plan:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
-        low, high = _PLATE
+        low, high = 0.2, 3.0  # m
         if self.plate is not None and not all(low <= side <= high for side in self.plate):
             raise BiodanceError(
                 f"Plan {self.name}: plate = {' by '.join(f'{side:g}' for side in self.plate)} m; legal are {low:g} to "

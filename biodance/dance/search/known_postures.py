@@ -220,9 +220,7 @@ def own_joint(part: str, joint: str) -> str:
 
 
 def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
-    """Return the word within the ranges of this body and the limits of the plan, None where that would leave too little
-    of it; of a word that is cut short the name says so.
-    """
+    """Return the word as this body and the plan's limits ask; None where too little of it is left."""
     if part == "legs":
         return word
     if _short_of(body, plan, part, word):
@@ -372,7 +370,8 @@ def _pair_words(pair: list[Word]) -> list[str]:
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:
     """Return the coordinates (S, n) of the postures with the words ``index`` (S, parts)."""
-    x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
+    x, knee = np.zeros((len(index), chain.size)), np.zeros(len(index))
+    names = {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
             # Rows of postures with this word of this part.
@@ -392,9 +391,7 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
 
 
 def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
-    """Return coordinates ``x`` (S, n) with the holding arms bent so that the palms come to their grips, or as near as
-    their joints reach: by least squares, step by step.
-    """
+    """Return ``x`` (S, n) with holding arms bent by least squares, so that the palms come to their grips."""
     x, limits = x.copy(), chain.body.limits
     for side in stance.holding:
         segment, local = palm(chain.body, SIDES[side])
@@ -412,10 +409,6 @@ def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
             step = np.einsum("sij,sj->si", inverse, left) + out
             x[:, arm] = np.clip(x[:, arm] + step, np.minimum(low, high), np.maximum(low, high))
     return x
-
-
-def _columns(chain: Chain) -> dict[str, int]:
-    return {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
 
 
 def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
@@ -467,9 +460,7 @@ def words_never_kept(table: PostureTable, limits: tuple[Limit, ...]) -> tuple[st
 
 
 def _short(table: PostureTable, limits: tuple[Limit, ...]) -> Array:
-    """Return what every posture of a table lacks of each of the limits at rest, (limits, S) in their scale, at most 0
-    where it is kept.
-    """
+    """Return what every posture lacks of each limit at rest, (limits, S) in their scale, at most 0 where it is kept."""
     rest = np.zeros_like(table.x)
     state, rows = State(table.chain, table.stance, table.x, rest, rest, sloped=False), list[Array]()
     for limit in (limit for limit in limits if limit.at_rest):

@@ -63,9 +63,7 @@ def _postures(work: DesignContext) -> Course:
 
 
 def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> Course:
-    """Return the course of the postures ``x`` on those of the ``stances`` that count, and of found ones on the others,
-    on which the weight is over one foot of two.
-    """
+    """Return the course of postures ``x`` on the ``stances`` that count, and of found ones on the others."""
     counted = [k for k, stance in enumerate(stances) if stance.over is None]
     rows = dict(zip(counted, x, strict=True))
     for k in (k for k, stance in enumerate(stances) if stance.over is not None):
@@ -215,9 +213,7 @@ def _other_posture(work: DesignContext, course: Course, place: int, rng: np.rand
 
 
 def _spare(course: Course, k: int, first: Course) -> set[int]:
-    """Return the end of move ``k`` that can be left out: a posture that counts, of a kind of which half is left of the
-    ``first`` course; none if there is no such end.
-    """
+    """Return the end of move ``k`` that can be left out, of a kind of which half is left; none without such an end."""
     now, before = ([stance.name for stance in one.stances if stance.over is None] for one in (course, first))
     for place in (k + 1, k):
         stance = course.stances[place]

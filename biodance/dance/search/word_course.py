@@ -37,8 +37,6 @@ from biodance.dance.search.move import AMPLE, ENOUGH, Move, Task, straight_move
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_PARTS = 2  # Parts of the body that change at a time
-
 
 def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
@@ -47,7 +45,7 @@ def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     for column, part in enumerate(table.parts):
         keys = np.array([word.key for word in table.words[part]])[table.index[:, column]]
         off += keys != was.get(part, table.words[part][0].key)
-    near = np.flatnonzero(off <= _PARTS).tolist()
+    near = np.flatnonzero(off <= 2).tolist()  # parts of the body that change at a time
     if last is not None and last.table is table and table.mirrored[last.s] >= 0:
         near = sorted({*near, int(table.mirrored[last.s])})
     return near
@@ -101,16 +99,12 @@ class NoNextPosture(BiodanceError):
 
 _INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
 _TRIES = 200  # Postures that are taken or given up before a search is
-_AT_ONCE = 12
-"""Postures of which one that imprecise people surely can is taken before others that tell more."""
 _LIFTING = 1.4  # Times as long as others that a move takes in which a foot is lifted or put down
 
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the search: the ``step`` and ``move`` that were taken to it, the ``posterior`` there, and what is
-    ``left`` to try after it, None before the first look.
-    """
+    """The ``step`` and ``move`` taken to a place, the ``posterior`` there, and what is ``left`` to try after it."""
 
     posterior: Array
     step: DanceStep | None = None
@@ -205,7 +199,8 @@ class WordSearch:
         first that imprecise people surely can; ``why`` counts the limits that others break.
         """
         last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, posterior))
-        while some := list(islice(ranked, _AT_ONCE)):
+        # of these one that imprecise people surely can is taken before others that tell more
+        while some := list(islice(ranked, 12)):
             doubtful = list[tuple[float, DanceStep, Move | None]]()
             for step in some:
                 room, broken, move = *self._kept(step), None
