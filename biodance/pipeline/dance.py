@@ -269,10 +269,6 @@ def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_numb
     return f"{said} {made}"
 
 
-_ALIKE = 0.001
-"""m by which sides of plates differ from what is written of them."""
-
-
 def plates_too_small(dance: Dance, session: Session) -> str:
     """Return a sentence where a session's plates together cannot carry all feet of a dance; else ""."""
     fits = [trial for trial in session if trial.role == "fit"]
@@ -284,7 +280,8 @@ def plates_too_small(dance: Dance, session: Session) -> str:
     points = np.concatenate(corners)
     size = np.ptp(points @ np.column_stack([along, [-along[1], along[0]]]), axis=0)
     room = room_on_plates(dance.stances)
-    if any(np.all(room <= one + _ALIKE) for one in (size, size[::-1])):
+    # m by which sides of plates differ from what is written of them
+    if any(np.all(room <= one + 0.001) for one in (size, size[::-1])):
         return ""
     return (
         f"{plate_sentence(dance)} The plates of {session.folder} cover {size[0]:.2f} m by {size[1]:.2f} m, and frames "

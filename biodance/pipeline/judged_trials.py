@@ -20,7 +20,6 @@ _ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
 TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
 """Why a trial with measured contact is not looked at."""
-_KEPT = "kept to measure what a finding gains"
 _POSTURES = "its rows are postures: identified from, and nothing told of movement, clocks or plates"
 _DIFFERENT = "plates and motion differ by more than a wrong body can make of it, in most of what is measured."
 
@@ -44,9 +43,7 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
 
 
 def _with_every_plate(trial: Trial, every: Mapping[str, Plate]) -> Trial:
-    """Return a trial with all plates of its session: one that its reader left out carried nothing there, and what it
-    read is not known, so that no cause of it shows.
-    """
+    """Return a trial with all plates of its session: one that its reader left out carried nothing there."""
     own = {plate.name: plate for plate in trial.plates}
     if not own or own.keys() == every.keys():
         return trial
@@ -122,7 +119,7 @@ def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, .
         if name in looked_at:
             reason = ""
         elif "fit" in roles and role not in ("fit", "static"):
-            reason = _KEPT
+            reason = "kept to measure what a finding gains"
         elif role == "static" and roles:
             reason = "quiet standing tells nothing beside so much movement"
         else:
