@@ -132,7 +132,6 @@ _RATE = 25.0  # Pictures per second
 _SIZE, _FLOOR = (290, 480), 450  # Of one view, px; row of the floor
 _MARGIN = 8.0  # px beside the widest posture
 _SCALE = 170.0  # px per metre of a person's height
-_TALL = 1.75  # m: bodies are drawn as large as if they were so tall
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Title and horizontal direction of the eye."""
 _FINE = 2  # Times as fine a picture is drawn before it is made smaller, so that edges are smooth
@@ -167,7 +166,7 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     # the tallest posture fits into the picture, and the widest: arms overhead, a leg lifted to the side
     planned = [outline for parts in seen[: len(_VIEWS)] for _, outline, _ in parts]
     wide, tall = np.max([np.abs(outline).max(axis=(0, 1)) for outline in planned], axis=0)
-    scale = min(_SCALE * _TALL / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
+    scale = min(_SCALE * 1.75 / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
     pictures = _pictures(seen, played.wrench.cop()[rows], played.time[rows], scale)
     with whole_file(out, over=True) as part:
         _write(pictures, part, out)
@@ -197,9 +196,7 @@ def _write(pictures: "Iterator[Image]", part: Path, out: Path) -> None:
 
 
 def _pictures(seen: list[list[tuple[str, Array, Array]]], cop: Array, time: Array, scale: float) -> "Iterator[Image]":
-    """Yield the instants of ``time`` s: what is ``seen`` (`silhouettes`) by both eyes of the plan, pale, then of what
-    was played, with its pressure (T, 3) m in red; ``scale`` px per m.
-    """
+    """Yield each instant: what is ``seen`` of the plan, pale, then as played; ``scale`` px per m."""
     from PIL import Image, ImageDraw
 
     width, height, floor = _SIZE[0] * _FINE, _SIZE[1] * _FINE, _FINE * _FLOOR

@@ -216,20 +216,13 @@ def _compared(found: SessionIdentification) -> list[Row]:
 
 
 def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tuple[str, Agreement]]:
-    """Return how well the table, the identified parameters, these with skin and flesh, and, beside the paper's,
-    those of the posterior agree.
-    """
+    """Return how well the table, the identified parameters and, beside the paper's, those of the posterior agree."""
     if found.posterior is None:
         extended = [("with skin and flesh", trial.extended_agreement)] if trial.extended_agreement else []
         return [("table", trial.table_agreement), ("identified", trial.identified_agreement), *extended]
     every = (*found.posterior.validations, *found.posterior.fitted)
     same = [("posterior", other.identified_agreement) for other in every if other.name == trial.name]
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
-
-
-def _mass_changes(changes: Sequence[Difference]) -> list[Row]:
-    rows = tables.DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
-    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
 
 
 def identification_section(found: SessionIdentification) -> str:
@@ -274,7 +267,10 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         suspects=tables.SUSPECT_ROW.rows(found.search.suspects),
-        changes=_mass_changes(found.changes),
+        changes=[
+            row if row["known"] else row | {"p": "cannot be known"}
+            for row in tables.DIFFERENCE_ROW.rows(row for row in found.changes if row.quantity == "mass")
+        ],
         comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),

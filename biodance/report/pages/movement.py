@@ -50,7 +50,6 @@ _FIRST = (
 """Key values of walking that are seen at once; all others are folded."""
 
 
-_STRIDES = Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}")
 _KEYS = Schema(
     "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
 )
@@ -68,7 +67,7 @@ def movement_section(moved: SessionMovement) -> str:
         "movement.html.j2",
         filters={"beside": _beside, "first_upper": first_upper},
         schemas={
-            "strides": _STRIDES,
+            "strides": Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}"),
             "keys": _FILE_KEYS if beside else _KEYS,
             "file_angle": FILE_ANGLE_ROW,
             "profile": Schema("", shown="score: {value} | right: {right} | left: {left}"),

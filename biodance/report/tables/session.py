@@ -246,7 +246,6 @@ _MOVED = Schema(
         "file_events": Schema("down late_s=late sd_s=sd count missed"),
     },
 )
-_MOVEMENT = Schema("parameters mass_kg=mass left_out", {"trials": _MOVED})
 
 
 def movement_document(moved: SessionMovement | None) -> Row | None:
@@ -256,7 +255,7 @@ def movement_document(moved: SessionMovement | None) -> Row | None:
     quantity and side: extremes of the mean over ``count`` repetitions and where in the cycle; ``sd_mean`` between
     repetitions, ``parameters_sd_mean`` what the inertial parameters leave uncertain, both averaged over the cycle.
     """
-    return _MOVEMENT.told(moved)
+    return Schema("parameters mass_kg=mass left_out", {"trials": _MOVED}).told(moved)
 
 
 _CYCLE = Schema("cycle=0 kind=1.kind cycle_side=1.side start_s=1.start end_s=1.end off_s=1.off")
