@@ -237,10 +237,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
     """Write ``report.html``, ``results.json``, ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
     document = plates_document(found)
-    texts = {
-        "report.html": plates_page(found, document),
-        "plates.csv": csv_text(found.table()),
-    }
+    texts = {"report.html": plates_page(found, document), "plates.csv": csv_text(found.table())}
     return write_results(folder, document, texts)
 
 
