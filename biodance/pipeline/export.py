@@ -398,7 +398,9 @@ def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tup
     if target.format not in FOLDERS:
         trial = _chosen(result.session, trial).name
     chosen = result.trials if trial is None else (result[trial],)
-    return target.trials(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, words)
+    # each prepared trial has a cut-off of its own; a session is written as it was asked for
+    trials = tuple(replace(one.trial, settings=result.settings) for one in chosen)
+    return target.trials(replace(result.session, trials=trials), chosen, body, words)
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:
