@@ -46,13 +46,6 @@ def plate_corners(stances: Iterable[Stance], plate: tuple[float, float]) -> Arra
     return (low + high) / 2 + half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
 
 
-def room_in_words(room: Array, *, seated: bool = False) -> str:
-    """Return in a phrase how much plate a dance needs (`room_on_plates`)."""
-    size = f"{room[0]:.2f} m of force plate from side to side and {room[1]:.2f} m ahead"
-    around = f"the feet need {size}, {100 * AROUND:g} cm around them included"
-    return f"the stool's legs need {size}" if seated else around
-
-
 def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
     """Return ``wide`` and ``forward`` of a plan, reduced where its plate asks for it: all feet fit on the plate.
 
@@ -97,10 +90,12 @@ def _too_small(plan: Plan, plate: tuple[float, float], least: Array, *, turned: 
     side, ahead = plate
     nearest = "" if plan.seated else ", as near together as is legal"
     remedy = f"Let the person face across it (--plate {ahead:g},{side:g})" if turned else "Use a larger plate"
+    size = f"{least[0]:.2f} m of force plate from side to side and {least[1]:.2f} m ahead"
+    around = f"the feet need {size}, {100 * AROUND:g} cm around them included"
+    needed = f"the stool's legs need {size}" if plan.seated else around
     return (
         f"Plan {plan.name}: on a plate of {side:g} m from side to side and {ahead:g} m ahead "
-        f"{room_in_words(least, seated=plan.seated)}{nearest}. {remedy}, or two plates side by "
-        f"side that touch, a foot on each."
+        f"{needed}{nearest}. {remedy}, or two plates side by side that touch, a foot on each."
     )
 
 

@@ -225,6 +225,11 @@ def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tu
     return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
 
 
+def _mass_changes(changes: Sequence[Difference]) -> list[Row]:
+    rows = tables.DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
+    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
+
+
 def identification_section(found: SessionIdentification) -> str:
     """Return the sections as HTML text; the same argument gives the same characters."""
     from markupsafe import Markup
@@ -267,10 +272,7 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         suspects=tables.SUSPECT_ROW.rows(found.search.suspects),
-        changes=[
-            row if row["known"] else row | {"p": "cannot be known"}
-            for row in tables.DIFFERENCE_ROW.rows(row for row in found.changes if row.quantity == "mass")
-        ],
+        changes=_mass_changes(found.changes),
         comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),
