@@ -216,7 +216,13 @@ def _known(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]
 
 
 def _found(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
-    return (*_of_folder(family, path), *_of_entry_points(family, packages))
+    found = [*_of_folder(family, path)]
+    for entry in _offered(family.group, packages):  # a module stands for what it provides
+        member = _loaded(entry, family.kind)
+        if inspect.ismodule(member) and family.provides:
+            member = getattr(member, family.provides, member)
+        found.append((member, _place(entry, family.kind)))
+    return tuple(found)
 
 
 @cache
@@ -240,17 +246,6 @@ def _of_module(family: Family[Any], name: str) -> tuple[Any, str]:
             "with '_' if it is a helper, or move the file away."
         )
     return (getattr(module, family.provides) if family.provides else module), file
-
-
-def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
-    """Return what installed packages offer, each with who offers it; a module stands for what it ``provides``."""
-    found = []
-    for entry in _offered(family.group, path):
-        member = _loaded(entry, family.kind)
-        if inspect.ismodule(member) and family.provides:
-            member = getattr(member, family.provides, member)
-        found.append((member, _place(entry, family.kind)))
-    return tuple(found)
 
 
 def _offered(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:

@@ -69,13 +69,9 @@ def digits(value: float, count: int) -> str:
     return f"{float(f'{value:.{count}g}'):g}"
 
 
-_JOINED = {"trunk_head": "trunk with head", "forearm_hand": "forearm with hand"}
-"""Parts of the body that one segment holds together."""
-
-
 def spaced(name: str) -> str:
     """Return a name as words: ``left forearm with hand``."""
-    for joined, said in _JOINED.items():
+    for joined, said in {"trunk_head": "trunk with head", "forearm_hand": "forearm with hand"}.items():
         name = name.replace(joined, said)
     return name.replace("_", " ")
 

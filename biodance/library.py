@@ -111,9 +111,7 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
 
 
 def _refuse_extreme(found: Any) -> None:
-    """Raise RecursionError where tables and lists lie in each other more than `_DEEPEST` times, ValueError for a whole
-    number of more than `_DIGITS` digits.
-    """
+    """Raise RecursionError for tables deeper than `_DEEPEST`, ValueError for a number of more than `_DIGITS` digits."""
     here = [found]
     for _ in range(_DEEPEST):
         inside = [one for some in here for one in (some.values() if isinstance(some, dict) else some)]

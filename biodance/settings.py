@@ -111,9 +111,7 @@ STANDARD_GRAVITY = 9.80665
 COP_FORCE = 20.0
 """N: with less vertical force on a plate its centre of pressure has no meaning."""
 FORCE_DOWN = 20.0
-"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
-the same).
-"""
+"""N of vertical force from which a foot counts as down (as Zeni 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
 SHORTEST_CONTACT = 0.05
 """s: a shorter contact of a foot, or a shorter time without, is noise."""
 TOUCH_FORCE = 30.0

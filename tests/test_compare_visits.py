@@ -34,8 +34,7 @@ from biodance.pipeline.visits import (
 from biodance.records import Session, Subject
 from biodance.report.visits import comparison_sentence, write_visits
 from biodance.uncertainty.visits import KeyKind, beyond_chance, change_of_mean, placement_sd, visit_mean
-from biodance.virtual_lab.movement import read_protocol
-from biodance.virtual_lab.simulate import write_visit
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit, perform_in
 
 SPEED = 0.9
@@ -67,7 +66,7 @@ def simulated(out: Path, *, day: int, speed: float = SPEED, mass: float = 62.0, 
         return perform_in(replace(instruments, visit=replace(instruments.visit, number=0)), person, trial)
 
     subject = Subject(mass, 1.70, "F", 31.0)
-    return write_visit(subject, read_protocol(plan), out, performed, seed=seed, visit=LabVisit(day))
+    return simulate_session(subject, plan, out, seed=seed, visit=LabVisit(day), performed=performed)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -165,6 +165,8 @@ def test_a_visit_is_exported_as_it_is_in_memory(result, tmp_path):
         biodance.export(result, tmp_path / "no.mot", format="mot", trial="squat1")
     place, said = biodance.export(result, tmp_path / "bids", format="bids", trial="squat_1")
     assert {one.name.split("_")[1] for one in place.rglob("*_motion.tsv")} == {"task-squat1"}
+    place, _ = biodance.export(result, tmp_path / "all", format="bids")
+    assert {one.name.split("_")[1] for one in place.rglob("*_motion.tsv")} >= {"task-dance1", "task-squat1"}
     with pytest.raises(biodance.BiodanceError, match="--trial: a file of format osim holds one body"):
         biodance.export(result, tmp_path / "no.osim", format="osim", trial="squat_1")
 

@@ -11,8 +11,6 @@ from biodance.lab.session.file import FILES
 from biodance.lab.session.results_folder import made_folder
 from biodance.library import parse_json
 
-_LONGEST_HEAD = 2**20
-"""Bytes of the line that tells the files."""
 _BROKEN = "What was dropped did not arrive whole, and nothing of it was kept. Drop it again."
 
 
@@ -56,7 +54,7 @@ async def _head(stream: AsyncIterator[bytes]) -> tuple[bytes, bytes]:
         if b"\n" in told:
             head, _, rest = told.partition(b"\n")
             return head, rest
-        if len(told) > _LONGEST_HEAD:
+        if len(told) > 2**20:
             break
     raise BiodanceError(_BROKEN)
 

@@ -49,7 +49,6 @@ _HEADERS: Mapping[str, str] = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-_READS = ("GET", "HEAD")
 
 
 class LoopbackGuard:
@@ -82,7 +81,7 @@ class LoopbackGuard:
         # a write comes from the page of this server, as JSON or a dropped folder, which no form can send
         kind = request.headers.get("content-type", "").startswith(("application/json", "application/octet-stream"))
         own = kind and request.headers.get("origin", "") in [f"http://{host}" for host in self._hosts]
-        if request.method not in _READS and not own:
+        if request.method not in ("GET", "HEAD") and not own:
             return PlainTextResponse("Changes are taken from the window's own page alone.", 403)
         if self._same(request.cookies.get(self._cookie, "")):
             return None
@@ -174,9 +173,7 @@ async def _read(request: Request) -> Asked:
 def _answered(
     work: Callable[[Asked], Any], read: Callable[[Request], Awaitable[Asked]] = _read
 ) -> Callable[[Request], Any]:
-    """Return an endpoint that does a ``work`` in a thread on what it reads of a request, and answers what that returns,
-    or with a sentence why not.
-    """
+    """Return an endpoint that does a ``work`` in a thread on what it reads, and answers it, or why not."""
 
     async def endpoint(request: Request) -> Response:
         try:

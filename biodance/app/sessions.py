@@ -4,7 +4,7 @@ import hashlib
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -39,7 +39,6 @@ from biodance.library import parse_json
 
 KeyChange = tuple[Sequence[str], Any]
 """Where in session.toml, as ``("subject", "mass_kg")``, and the new value; None takes the key out."""
-_DEEPEST = 4
 
 
 class ChangedElsewhereError(BiodanceError):
@@ -49,8 +48,8 @@ class ChangedElsewhereError(BiodanceError):
 class SessionText:
     """The session.toml of the session in ``folder``, with all states that it had in the folder ``history``.
 
-    States are files ``0001.toml``, ... in the order in which they were; none is ever removed. `undo` goes back along
-    them and `redo` forth; a change after `undo` adds the state gone back to, and then the new one.
+    States are files ``0001.toml``, ... in the order in which they were; none is ever removed. `step` goes back along
+    them and forth; a `change` after that adds the state gone back to, and then the new one.
     """
 
     def __init__(self, folder: Path, history: Path) -> None:
@@ -81,8 +80,8 @@ class SessionText:
         changed = bool(states) and _read(states[at]) != self.text
         return at > 0 or changed, at < len(states) - 1 and not changed
 
-    def change(self, changes: Sequence[KeyChange], revision: str) -> None:
-        """Change keys of the file, which must be as at the ``revision``; comments and order stay.
+    def change(self, revision: str, changed: Callable[[str], str]) -> None:
+        """Write what ``changed`` makes of the file's text, which must be as at the ``revision``.
 
         Raises
         ------
@@ -93,26 +92,27 @@ class SessionText:
         """
         with self._lock:
             self._same(revision)
-            self._write(changed_text(self.text, changes))
-
-    def replace(self, text: str, revision: str) -> None:
-        """Write another text, as `change`."""
-        with self._lock:
-            self._same(revision)
-            self._write(text)
-
-    def undo(self, revision: str) -> None:
-        """Go back to the state before; nothing where there is none."""
-        with self._lock:
-            self._same(revision)
+            text = changed(self.text)
+            check_session_text(self.path, text)
+            if text == self.text:
+                return
+            # a change after undo: the state gone back to is added again, so that no later one is lost
             self._keep()
-            self._go(self._position() - 1)
+            if self._position() < len(self._states()) - 1:
+                self._add(self.text)
+            self._add(text)
+            self._put(text)
 
-    def redo(self, revision: str) -> None:
-        """Go forth to the state that was undone; nothing where there is none."""
+    def step(self, revision: str, by: int) -> None:
+        """Go back to the state before (-1), or forth to the one that was undone (1); nothing where there is none."""
         with self._lock:
             self._same(revision)
-            self._go(self._position() + 1)
+            if by < 0:
+                self._keep()
+            states, at = self._states(), self._position() + by
+            if 0 <= at < len(states):
+                self._put(_read(states[at]))
+                self._at = at
 
     def _same(self, revision: str) -> None:
         if revision != self.revision:
@@ -120,17 +120,6 @@ class SessionText:
                 f"{self.path.name} was changed elsewhere in the meantime. It is shown as it is now; make your change "
                 f"again."
             )
-
-    def _write(self, text: str) -> None:
-        check_session_text(self.path, text)
-        if text == self.text:
-            return
-        # a change after undo: the state gone back to is added again, so that no later one is lost
-        self._keep()
-        if self._position() < len(self._states()) - 1:
-            self._add(self.text)
-        self._add(text)
-        self._put(text)
 
     def _keep(self) -> None:
         """Keep what stands there now as the last state, unless it is the one that was written here."""
@@ -142,12 +131,6 @@ class SessionText:
         number = len(self._states()) + 1
         write_whole(made_folder(self._history) / f"{number:04}.toml", text.encode())
         self._at = number - 1
-
-    def _go(self, at: int) -> None:
-        states = self._states()
-        if 0 <= at < len(states):
-            self._put(_read(states[at]))
-            self._at = at
 
     def _put(self, text: str) -> None:
         if text:
@@ -178,7 +161,7 @@ def changed_text(text: str, changes: Sequence[KeyChange]) -> str:
 
 
 def _set(document: Container, keys: list[str], value: Any) -> None:
-    if not 1 <= len(keys) <= _DEEPEST or not all(isinstance(key, str) and key for key in keys):
+    if not 1 <= len(keys) <= 4 or not all(isinstance(key, str) and key for key in keys):
         raise ValueError(f"{keys!r} is no key")
     if value is None:
         return _take_out(document, keys)

@@ -26,7 +26,6 @@ from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import EVENT_ROW
 
 _FRAMES = 1500  # Frames of a trial that are drawn at most
-_POINTS = 600  # Points of a curve that are drawn at most
 _LOADED = 20.0  # N from which a plate has a centre of pressure
 
 
@@ -78,7 +77,7 @@ def forces_document(trial: Trial) -> dict[str, Any]:
     rows = []
     for plate in trial.plates:
         time, force = plate.wrench.time, plate.wrench.value[:, 2]
-        chosen = np.arange(0, time.size, max(1, -(-time.size // _POINTS)))
+        chosen = np.arange(0, time.size, max(1, -(-time.size // 600)))
         path = plate.wrench.cop(height=plate.height, threshold=_LOADED)[chosen, :2]
         cop = path[np.isfinite(path).all(axis=1)].round(4)
         about = {"time_s": time[chosen].round(4), "force_n": force[chosen].round(1), "cop_m": cop}

@@ -16,7 +16,15 @@ import numpy as np
 from starlette.responses import Response
 
 from biodance.app.limits import limits_form, limits_text
-from biodance.app.sessions import Archive, SessionPlace, Worker, allowed_folder, folders_document, results_beside
+from biodance.app.sessions import (
+    Archive,
+    SessionPlace,
+    Worker,
+    allowed_folder,
+    changed_text,
+    folders_document,
+    results_beside,
+)
 from biodance.app.view import SessionView, forces_document, markers_document
 from biodance.batch.summary import folder_name
 from biodance.batch.work import TABLES
@@ -279,25 +287,23 @@ class Window:
         changes = asked.body.get("changes")
         if not isinstance(changes, list) or not all(isinstance(one, list) and len(one) == 2 for one in changes):
             raise BiodanceError('changes must be a list of [["subject", "mass_kg"], 70] or with null.')
-        place = self._place(asked)
-        place.file.change(
-            [(keys if isinstance(keys, list) else [keys], value) for keys, value in changes], asked.text("revision")
-        )
+        listed = [(keys if isinstance(keys, list) else [keys], value) for keys, value in changes]
+        self._place(asked).file.change(asked.text("revision"), lambda text: changed_text(text, listed))
         return self.session(asked)
 
     def text(self, asked: Asked) -> dict[str, Any]:
         """Write session.toml as text."""
-        self._place(asked).file.replace(asked.text("text"), asked.text("revision"))
+        self._place(asked).file.change(asked.text("revision"), lambda _: asked.text("text"))
         return self.session(asked)
 
     def undo(self, asked: Asked) -> dict[str, Any]:
         """Go back to the session.toml before."""
-        self._place(asked).file.undo(asked.text("revision"))
+        self._place(asked).file.step(asked.text("revision"), -1)
         return self.session(asked)
 
     def redo(self, asked: Asked) -> dict[str, Any]:
         """Take the last undo back."""
-        self._place(asked).file.redo(asked.text("revision"))
+        self._place(asked).file.step(asked.text("revision"), 1)
         return self.session(asked)
 
     def markers(self, asked: Asked) -> dict[str, Any]:

@@ -48,12 +48,6 @@ Work = Callable[[SessionTask], Outcome]
 Outcomes = Generator[tuple[SessionTask, Outcome], None, None]
 TRIES = 3
 """Times that a session may lose its process before it is given up."""
-_AHEAD = 2
-"""Tasks sent to a cluster for each of its threads: the second waits where the first is worked on."""
-_FRESH = 50
-"""Sessions after which a process is replaced, so that memory stays flat."""
-_ASKED = 0.2
-"""s between two looks at whether somebody has stopped the work."""
 
 
 def run_here(
@@ -98,7 +92,8 @@ def _beside(
             while waiting and free:
                 task, pool = waiting.popleft(), free.pop()
                 flying[_submitted(pool, work, task)] = task, pool
-            for future in wait(flying, timeout=_ASKED, return_when=FIRST_COMPLETED).done:
+            # s between two looks at `stop`
+            for future in wait(flying, timeout=0.2, return_when=FIRST_COMPLETED).done:
                 task, pool = flying.pop(future)
                 if isinstance(future.exception(), BrokenProcessPool):
                     pool.shutdown()
@@ -148,7 +143,8 @@ def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
     prepare_workers()
     context = multiprocessing.get_context("forkserver")
-    return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
+    # a new process after 50 sessions keeps the memory flat
+    return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=50)
 
 
 def ready_process() -> ProcessPoolExecutor:
@@ -193,7 +189,8 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     waiting, alone = deque(tasks), deque[SessionTask]()
     try:
         with client:
-            places = lambda: _AHEAD * max(1, sum(client.nthreads().values()))  # noqa: E731
+            # two tasks a thread: the second waits where the first is worked on
+            places = lambda: 2 * max(1, sum(client.nthreads().values()))  # noqa: E731
             yield from _on_cluster(client, work, waiting, alone, places)
             yield from _on_cluster(client, work, alone, None, lambda: 1)
     except (dask.CancelledError, OSError) as error:

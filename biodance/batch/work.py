@@ -349,10 +349,6 @@ _TRIAL = Schema(
     "trial=name role status reason frames rate_hz gaps_percent marker_rms_m marker_max_m "
     "fz_rms_table_n=wrench.table.rms.2 fz_rms_identified_n=wrench.identified.rms.2"
 )
-_MASS = Schema(
-    "declared_mass_kg=subject.mass_kg mass_on_plates_kg=mass_check.mass_on_plates_kg "
-    "mass_difference_percent=mass_check.difference_percent"
-)
 
 
 def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
@@ -366,7 +362,10 @@ def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         "verdict": verdict,
         "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
         "first": document["attention"][0]["text"] if document["attention"] else "",
-        **_MASS.row(document),
+        **Schema(
+            "declared_mass_kg=subject.mass_kg mass_on_plates_kg=mass_check.mass_on_plates_kg "
+            "mass_difference_percent=mass_check.difference_percent"
+        ).row(document),
     }
     rows = [
         {

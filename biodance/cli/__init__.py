@@ -17,12 +17,6 @@ from biodance.cli.shared import DONE, NOT_DONE, STOPPED, app, say
 __all__ = ["app", "archive", "dance", "files", "main", "run", "session"]
 
 
-_NEW_OBJECTS = 1_000_000
-"""How many objects may be new before circles among them are looked for: what is imported is 300,000 (Python's own
-limit is 700).
-"""
-
-
 def run(tokens: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; every expected fault is one sentence on stderr."""
     from biodance.errors import BiodanceError
@@ -88,7 +82,7 @@ def main() -> None:
             os.fstat(number)
         except OSError:
             _onto_nothing(number)
-    gc.set_threshold(_NEW_OBJECTS)
+    gc.set_threshold(1_000_000)  # Python's own limit is 700: imports alone make 300,000 objects
     code = run()
     gc.freeze()
     sys.exit(code)

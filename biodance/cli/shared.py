@@ -72,7 +72,6 @@ ForceOption = Annotated[
     Parameter(help="Write into a non-empty folder; overwrite existing files."),
 ]
 Tables = Annotated[Path | None, Parameter(help="Also write the results as tables (CSV and Parquet) to this folder.")]
-OpenOption = Annotated[bool, Parameter(name="--open", help="Open the report in a browser when done.")]
 OutOption = Annotated[Path, Parameter(help="Output folder; created if it does not exist.")]
 
 ReferenceOption = Annotated[
@@ -210,7 +209,7 @@ class Results:
 
     out: OutOption
     tables: Tables = None
-    open_page: OpenOption = False
+    open_page: Annotated[bool, Parameter(name="--open", help="Open the report in a browser when done.")] = False
     json: JsonOption = False
     force: ForceOption = False
 
@@ -231,11 +230,6 @@ class Results:
         say(f"No browser was found here. Open {page} on a machine that has one.")
 
 
-_COUNTED, _EVERY = re.compile(r"(?P<done>\d+) of (?P<all>\d+)"), 5.0
-"""How a message counts; s between two lines where stderr is no terminal: a short run says nothing, a long log is short.
-"""
-
-
 class TimeLeft:
     """Estimate of the time left in a stage from its progress messages ("3 of 11"); ``clock`` in s."""
 
@@ -244,7 +238,7 @@ class TimeLeft:
 
     def said(self, text: str) -> str:
         """Return the words with the time left in this stage, where they count its items."""
-        counted = _COUNTED.search(text)
+        counted = re.search(r"(?P<done>\d+) of (?P<all>\d+)", text)
         if counted is None:
             return text
         done, total = int(counted["done"]), int(counted["all"])
@@ -285,7 +279,7 @@ def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Calla
     def tell(text: str) -> None:
         nonlocal last
         line = left.said(text)
-        if clock() - last >= _EVERY:
+        if clock() - last >= 5.0:  # s: a short run says nothing, a long log is short
             last = clock()
             sys.stderr.write(f"{without_codes(line)}\n")
 

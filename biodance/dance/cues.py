@@ -23,9 +23,6 @@ COUNTS = ("one", "two", "three", "four", "five", "six", "seven", "eight")
 """As seconds are counted."""
 _STEP = 15.0  # degrees to which angles are rounded
 _MOST = 4  # Things that a person can begin at once
-_ALIKE = 12.0  # degrees within which right and left are called as a pair
-_FORWARD = np.array([1.0, 1.0, -1.0])  # Signs of turn, drop and tilt as they are called
-_BENT = 30.0  # degrees by which the hips lean of themselves when knees that stand bend
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 _ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
@@ -137,7 +134,7 @@ def calls(
     whole_body = _words("hips")
     least = dict.fromkeys(whole_body, _SMALLEST)
     if any(f"{side}_knee_flexion" in changes for side in planted):
-        least["hips_flexion"] = _BENT
+        least["hips_flexion"] = 30.0  # degrees by which hips lean of themselves
     changes |= {
         name: (float(b), float(a)) for name, b, a in zip(whole_body, *hips, strict=True) if abs(a - b) >= least[name]
     }
@@ -157,7 +154,7 @@ def calls(
             continue
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
-        pair = side and other in changes and abs(changes[other][1] - end) <= _ALIKE
+        pair = side and other in changes and abs(changes[other][1] - end) <= 12.0  # degrees
         if pair:
             partner = changes.pop(other)
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
@@ -166,9 +163,7 @@ def calls(
 
 
 def _movements(body: Body, before: Array, after: Array) -> Iterator[tuple[str, str, float, float]]:
-    """Yield of every joint its name, the one of its words, and its angle before and after, degrees: flexion of a
-    shoulder turns an arm that is held out about itself.
-    """
+    """Yield the name of every joint, that of its words, and its angle before and after, degrees."""
     angles = {joint.name: (float(b), float(a)) for joint, b, a in zip(body.joints, before, after, strict=True)}
     for name, ends in angles.items():
         side, movement = _split(name)
@@ -190,7 +185,7 @@ def instructions(
 
     ``before``, ``after`` (n,) coordinates of the chain; ``was`` the feet before, None at the start, ``now`` after.
     """
-    hips = tuple(np.degrees(_FORWARD * x[ROOT - 3 : ROOT]) for x in (before, after))
+    hips = tuple(np.degrees(np.array([1.0, 1.0, -1.0]) * x[ROOT - 3 : ROOT]) for x in (before, after))
     before, after = before[ROOT:], after[ROOT:]
     planted = tuple(SIDES[side] for side in now.planted)
     if was is None and now.seat:  # whoever sits lets the legs hang
@@ -225,9 +220,7 @@ def skipping(dance: Dance, p: int, before: int, say: Say = in_english) -> tuple[
 
 
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
-    """Return what the feet do between two stances (a leg that is lifted is told by its joints), or what the hands take
-    hold of at the start.
-    """
+    """Return what the feet do between two stances, or what the hands take hold of at the start."""
     if was is None:
         if not now.holding:
             return ()

@@ -30,13 +30,10 @@ from biodance.threads import Sendable
 if TYPE_CHECKING:
     import pandas as pd
 
-LARGEST = 2**26
-"""Bytes of a dance.npz, unpacked: a thousand times a dance of forty postures."""
 MOST_POSTURES, LONGEST = 1000, 3600.0
 """Postures of a dance, and s that it lasts: what nobody performs."""
 _FAR = 10.0  # m: nothing of a dance is farther from the lab origin
 Metres = Annotated[float, Field(ge=-_FAR, le=_FAR, allow_inf_nan=False)]
-_Grip = Annotated[float, Field(allow_inf_nan=True)]  # m, NaN = a free hand
 _Foot = Annotated[int, Field(ge=0, le=1)]
 
 
@@ -55,7 +52,7 @@ class StanceWords(_Entry):
     props: list[list[Metres]] = []
     seat: float = Field(0.0, ge=0, le=3, allow_inf_nan=False)
     over: _Foot | None = None
-    hands: list[list[_Grip]]
+    hands: list[list[Annotated[float, Field(allow_inf_nan=True)]]]  # m, NaN = a free hand
     hanging: list[_Foot] = Field(default_factory=list, max_length=2)
 
 
@@ -117,9 +114,6 @@ def possible_array(name: str, array: Array) -> Array:
 
 
 _GIVE = "Give the dance.npz that biodance dance wrote, or its folder."
-_VERSION = 1
-_PERSON = ("mass", "stature", "sex", "age")
-"""What is kept of the person for whom a dance was designed; an unknown age is not."""
 
 
 _chain_of = lru_cache(maxsize=4)(Chain)
@@ -332,9 +326,9 @@ class Dance(Sendable):
         --------
         >>> dance.save("again.npz")
         """
-        words = {"biodance_dance": _VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
+        words = {"biodance_dance": 1, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
         if self.subject is not None:
-            who = {name: getattr(self.subject, name) for name in _PERSON}
+            who = {name: getattr(self.subject, name) for name in ("mass", "stature", "sex", "age")}
             words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
         words |= {"care": self.care, "rest": self.rest}
@@ -372,7 +366,8 @@ class Dance(Sendable):
         path = Path(path) / "dance.npz" if Path(path).is_dir() else Path(path)
         refuse_special(path)
         try:
-            refuse_large(path, LARGEST)
+            # bytes, unpacked: a thousand times a dance of forty postures
+            refuse_large(path, 2**26)
             with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as found:
                 text = parse_json(str(found["words"]))
                 words = DanceWords.model_validate(text).model_dump(exclude_unset=True)

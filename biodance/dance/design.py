@@ -29,7 +29,6 @@ _ROUNDS = 6  # Times that all performers dance the whole dance at most
 _OTHERS = 6  # Postures that are tried in the place of one
 _FEW = 40  # Performers of a first look
 
-_MUCH = 1 / 3  # Share of the plan's postures with which nothing longer is looked for
 
 _Other = tuple[Course, tuple[int, ...]]  # A course, and the postures where it differs
 
@@ -57,7 +56,7 @@ def safe_course(work: DesignContext) -> tuple[Course, PerformersResult]:
         except NoNextPosture as why:
             missing.append(why)
         else:
-            if found[-1][1].safe and len(found[-1][0].steps) >= _MUCH * plan.count:
+            if found[-1][1].safe and len(found[-1][0].steps) >= plan.count / 3:
                 return found[-1]
     if not found:
         raise missing[0]
@@ -120,9 +119,7 @@ def _repaired_at(search: WordSearch, course: Course, p: int, found: PerformersRe
 def _room(
     search: WordSearch, course: Course, only: tuple[int, ...], first: tuple[int, ...], workers: Executor
 ) -> float:
-    """Return how far the worst performer stays from what is demanded to and in the postures ``only``, in scales of the
-    limits; those who came too near before dance ``first``, the others only if these have room.
-    """
+    """Return how far, in scales, the worst performer stays from what is demanded in postures ``only``."""
     limits, dance, room = search.work.plan.limits, course.dance(search.work), float("inf")
     scale = {f"{limit.name}_{OF_PERFORMERS}": limit.scale for limit in limits}
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
@@ -135,9 +132,7 @@ def _room(
 
 
 def _others(search: WordSearch, course: Course, p: int, found: PerformersResult) -> Iterator[_Other]:
-    """Yield what else may be done at posture ``p`` or just before, what changes least first: another move of the same
-    time, another posture, a slower move, another posture before, none at all.
-    """
+    """Yield what else may be done at posture ``p`` or just before, what changes least first."""
     yield from _by_other_moves(search, course, p, slower=False)
     last = min(p + 1, len(course.steps) - 1)
     yield from ((one, tuple(range(p, last + 1))) for one in islice(_exchanged(search, course, p), _OTHERS))
@@ -192,9 +187,6 @@ def _without(search: WordSearch, course: Course, p: int, found: PerformersResult
     return replace(shorter, notes=(*course.notes, note))
 
 
-WORKERS = 2
-
-
 @one_thread()
 def design(
     body: Body,
@@ -219,7 +211,7 @@ def design(
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
     if workers is None:
-        with ProcessPoolExecutor(WORKERS) as pool:
+        with ProcessPoolExecutor(2) as pool:
             return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
     plan = plan.with_limits(limits)
     alone = DesignContext.alone(body, plan, seed)

@@ -53,8 +53,7 @@ _STILL = 1.5
 (docs/benchmarks/dance.md), and it would cost time.
 """
 ROBOT_ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
-"""N, N·m: error of one sample of a robot's wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table
-II)."""
+"""N, N·m: error of one sample of a robot's wrench, unexplained of a movement of HOAP-3 (Bonnet 2016, table II)."""
 ROBOT_RATE = 4.0
 """Hz: independent samples of the wrench of a robot."""
 
@@ -144,11 +143,6 @@ def movement_evidence(
     return MovementEvidence(body, triangle.T @ triangle, scores)
 
 
-def _robot_noise() -> Noise:
-    """Return the noise of a robot's wrench: one band, the same error at all frequencies."""
-    return Noise(np.diag(ROBOT_ERROR**2)[None], np.zeros(3))
-
-
 @one_thread()
 def expect(dance: Dance, *, steps: int = 10) -> Expectation:
     """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures; of a robot if it
@@ -169,7 +163,8 @@ def expected_spread(body: Body, motion: Motion, ends: Array, *, robot: bool = Fa
     instant ``ends`` (D,) s.
     """
     # One noise for all stretches: their informations are about one point and in the same bands.
-    noise = _robot_noise() if robot else typical_noise(predict_wrench(body, motion))
+    robots = Noise(np.diag(ROBOT_ERROR**2)[None], np.zeros(3))  # one band: the same error at all frequencies
+    noise = robots if robot else typical_noise(predict_wrench(body, motion))
     size = 10 * len(body.segments)
     told = [MovementEvidence(body, np.zeros((size, size)), Mismatch(*np.zeros((2, size, 1))))]
     for start, end in pairwise([motion.time[0], *ends]):
@@ -201,10 +196,6 @@ def _danced() -> dict[str, Any]:
 
 
 _FELT = 1.0  # s: a hold that is judged alone says nothing more after this time
-_TRUST = 0.1
-"""Share of the information that disturbances leave where postures and moves are judged one by one: with it whole dances
-tell of every segment what is expected of them.
-"""
 _AT_REST = slice(2, 5)  # Components of a wrench (Fx, Fy, Fz, Mx, My, Mz) that a body at rest has
 
 
@@ -230,7 +221,8 @@ def movement_information(dance: Dance) -> MovementInformation:
     plan = dance.motion(JUDGED_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
     # Information of a coefficient: 1 / variance.
-    weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
+    # so much of it disturbances leave where postures and moves are judged one by one
+    weights = 0.1 / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened_prior(dance.body.sip).covariance)
     # V sqrt(lambda): a root of a covariance that may be singular.
     root = vector * np.sqrt(np.maximum(value, 0.0))
@@ -352,9 +344,7 @@ def _same_joints(dance: Dance, body: Body) -> None:
 
 
 def _repetitions(dance: Dance, body: Body, known: MovementEvidence, noise: Noise) -> tuple[Repetition, ...]:
-    """Return the transitions that gain most beside what is ``known``, best first; steps to another place, which the
-    feet cannot simply repeat, are left out.
-    """
+    """Return the moves that gain most beside what is ``known``, best first; none to another place of the feet."""
     some = {
         phase: _once(dance, body, phase.start, phase.end, noise)
         for phase in dance.phases
@@ -402,8 +392,6 @@ _BALLS = (
     *(("pelvis", "right_thigh"), ("pelvis", "left_thigh"), ("pelvis", "trunk_head")),
     *(("trunk_head", "right_upper_arm"), ("trunk_head", "left_upper_arm")),
 )
-_UNKNOWN, _SKIN = 0.015, 0.020
-"""m: what is not known of a centre before the movement, and how far skin slides in one posture."""
 CENTRES = 6 * len(_BALLS)
 """Unknown coordinates of all centres."""
 
@@ -489,4 +477,4 @@ def rows_of_centres(chain: Chain, x: Array, columns: int) -> Array:
         # c - R d = what is to be known of the distance; R = R_near' R_far.
         out[3 * k : 3 * k + 3, here : here + 6] = np.hstack([np.eye(3), -first.T @ second])
     # Prior deviation over error.
-    return out * _UNKNOWN / _SKIN
+    return out * 0.015 / 0.020

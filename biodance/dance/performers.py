@@ -27,7 +27,6 @@ _RATE, _PLAN_RATE = 5.0, 25.0  # Hz at which performances are judged, and the pl
 _WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5  # Hz: how fast errors, tempo and sway change
 _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
-_PENDULUM = 0.1  # s²: height of the centre of mass over gravity
 _LIFT = 1.0  # Share of a move in which a foot leaves the ground, or comes back
 _FELT = 3.0
 """s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
@@ -79,9 +78,7 @@ def _noise(
 
 @lru_cache(maxsize=16)
 def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
-    """Return frequencies (F,) Hz up to 2.5 times the ``cutoff``, and their cosines and sines (T, F) at ``instants``
-    (T,) s, which all performers of a dance share.
-    """
+    """Return frequencies (F,) Hz, their cosines and sines (T, F) at ``instants`` (T,) s, the same for all."""
     time = np.frombuffer(instants)
     # Longer than the dance, so that no curve repeats itself in it.
     duration = 1.3 * (time[-1] - time[0]) + 1.0
@@ -154,7 +151,7 @@ class PlannedDance:
         parts = list[tuple[Array, Array, Array, Array]]()
         for rng, time, when, part in people:
             error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
-            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
+            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=0.1, part=part)
             parts.append((time[part], when[part], error, sway))
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)
@@ -169,9 +166,7 @@ class PlannedDance:
         return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
 
     def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
-        """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
-        centre of mass off by its ``sway`` m (T, 2).
-        """
+        """Return the plan at ``when``, off by ``error`` rad (T, n - 3) and ``sway`` m (T, 2)."""
         error = error.copy()
         for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
             error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
@@ -220,7 +215,6 @@ OF_PERFORMERS = "of_performers"
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
 _DRAWN = 96  # Imprecise copies of an instant that are looked at
-_TOGETHER = 1000  # Frames of performers that are looked at together
 _STILL = 1e-4  # Least deviation, in the limit's unit
 
 
@@ -286,9 +280,7 @@ def try_performers(
 def _rooms(
     dance: Dance, limits: tuple[Limit, ...], who: Sequence[int], only: tuple[int, ...], how: Imprecision
 ) -> dict[str, tuple[Array, list[str]]]:
-    """Return for every limit the least that each performer leaves on the way to and in every posture (K, P), infinite
-    where nobody looked, and where in the body that is least (K).
-    """
+    """Return the least that each performer leaves of every limit by posture (K, P), and where (K)."""
     people, asked = [_person(dance, k, only, how) for k in who], for_imprecise(limits)
     when = np.concatenate([when[part] for _, _, when, part in people])
     plan, room = PlannedDance(dance, (when.min(), when.max())), {limit.name: list[Array]() for limit in asked}
@@ -314,9 +306,7 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 
 
 def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _Person:
-    """Return performer ``k``, and the instants at which he or she dances to or in the postures ``only``, and two beyond
-    for differences.
-    """
+    """Return performer ``k``, and the instants of the dance to or in the postures ``only``."""
     time, when = draw_clock(np.random.default_rng([0, 7, k]), dance.duration, how)
     part = slice(None)
     if only:
@@ -329,7 +319,7 @@ def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _P
 def _groups(people: list[_Person]) -> Iterator[list[_Person]]:
     """Yield people who are looked at together: calls cost more than a few frames, and many frames need memory."""
     frames = np.cumsum([when[part].size for _, _, when, part in people])
-    for _, some in groupby(zip(frames // _TOGETHER, people, strict=True), key=itemgetter(0)):
+    for _, some in groupby(zip(frames // 1000, people, strict=True), key=itemgetter(0)):
         yield [one for _, one in some]
 
 

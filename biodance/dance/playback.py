@@ -30,18 +30,10 @@ _DAMPING, ROTOR = 0.05, 0.005
 nothing else resists them."""
 SETTLE = 0.5
 """s in which the first posture is held before the motion begins, so that the floor bears the body."""
-FALLEN = 0.6
-"""Share of the planned height of the root below which the body has fallen."""
-HARD = 0.002
-"""s, time constant of the contacts: at 8 ms a foot under the whole body sinks by 0.6 mm, which tilts a person on one
-leg until he falls; 4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the plan.
-"""
 RADIUS = 0.004
 """m, of the contact points under the soles."""
 _EQUAL = 0.03
 """Weight of equal forces at the corners of the soles, against the zero-moment point in dm."""
-TOUCHING = 0.01
-"""m over the floor up to which a planned sole counts as planted for the planned torques."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +84,8 @@ def floor_model(body: Body, *, friction: float = 0.5) -> Any:
     spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
     spec.option.timestep, spec.option.integrator = _STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    contact: dict[str, Any] = {"solref": [HARD, 1.0], "friction": [friction, 0.0, 0.0], "condim": 3}
+    # s: at 8 ms a foot under the whole body sinks by 0.6 mm, and a person on one leg falls
+    contact: dict[str, Any] = {"solref": [0.002, 1.0], "friction": [friction, 0.0, 0.0], "condim": 3}
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=1, conaffinity=2, **contact)
     feet = body.feet.values()
     touching = [(foot.segment, corner, RADIUS) for foot in feet for corner in foot.outline + np.array([0, RADIUS, 0])]
@@ -110,7 +103,8 @@ def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np
     pose, feet = poses(body, motion.q), _both(body)
     soles = [pose.points([foot.segment] * len(foot.outline), foot.outline) for foot in feet]
     if down is None:
-        down = np.stack([sole[:, :, 2].mean(axis=1) < TOUCHING for sole in soles], axis=1)
+        # m over the floor: planted
+        down = np.stack([sole[:, :, 2].mean(axis=1) < 0.01 for sole in soles], axis=1)
     parts = borne_by_feet(wrench, soles, down)
     names = [body.segments[foot.segment] for foot in feet]
     return joint_torques(body, motion, dict(zip(names, parts, strict=True))).torque
@@ -180,7 +174,7 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
         rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(data), q))
         for part in driver.touching(data):
             touched.setdefault(part, float(motion.time[frame]))
-        if data.qpos[2] < FALLEN * motion.q[frame, 2]:
+        if data.qpos[2] < 0.6 * motion.q[frame, 2]:
             fell = float(motion.time[frame])
             break
     angle, root, tilt, floor, q = (np.array(column) for column in zip(*rows, strict=True))

@@ -27,12 +27,10 @@ from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 
-_WHERE = 4  # Beside the seed: what is searched for at random here
-
 
 def reposition(dance: Dance, plan: Plan) -> Dance:
     """Return the dance with the move from rest in front; where there is none, the dance with a note that says so."""
-    feet, upright, seed = replace(dance.stances[0], over=None), np.zeros((1, dance.chain.size)), [dance.seed, _WHERE]
+    feet, upright, seed = replace(dance.stances[0], over=None), np.zeros((1, dance.chain.size)), [dance.seed, 4]
     try:
         rest = intermediate_posture(dance.chain, feet, upright, plan.limits, seed=seed, mild=1.0).x
         ends = np.array([rest, dance.postures[0]])
@@ -58,10 +56,6 @@ def reposition(dance: Dance, plan: Plan) -> Dance:
 
 _LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
-_FORWARD = 2.0
-"""1/m: the right foot stands ahead by this times the plan's m times the leg's: 0.1 m, legs of 0.25 m (paper III.D)."""
-UNHURRIED = 2.5
-"""rad/s: a robot of slower joints (median) takes longer, in proportion: 5 s, not 2 s, at 1 rad/s (paper, Fig. 11)."""
 _LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
 
@@ -85,11 +79,13 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
             f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {_LIGHTEST:g} kg and more."
         )
     usual = float(np.median(body.limits.velocity))
-    ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
+    # 0.1 m ahead, of legs of 0.25 m (paper III.D)
+    ahead = float(np.clip(plan.forward * 2.0 * leg_length(body), 0.05, 0.4))
     free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0, "plate": None}
     if any(isinstance(limit, Balance) and limit.share == FOLLOWABLE_SHARE for limit in plan.limits):
         plan = plan.with_limits([Balance()])  # people have performers instead
-    slower = max(1.0, UNHURRIED / usual)
+    # rad/s: slower joints take longer, in proportion (paper, Fig. 11)
+    slower = max(1.0, 2.5 / usual)
     return replace(plan, move=plan.move * slower, slower=slower, forward=ahead, **free)
 
 

@@ -14,14 +14,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit
 from biodance.dance.limits import Margin as Margin
-from biodance.dance.problem.excitation import (
-    condition,
-    dynamic_grams,
-    excitation_blocks,
-    static_grams,
-    total,
-    uprights,
-)
+from biodance.dance.problem import excitation
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via
 from biodance.dance.problem.stance import Stance
@@ -105,8 +98,6 @@ def _continuity(dance: Dance) -> Margin:
 
 
 _PAPER_RATE = 50.0  # Hz, of the paper's transitions
-_LITTLE = 0.01
-"""rad²/s³: information on every inertia supposed before the first move, so that condition numbers are finite."""
 POOR = 30.0
 """Condition number above which a segment was hardly tilted: gravity does not tell where along it the mass is."""
 
@@ -147,24 +138,25 @@ def longest_alone(dance: Dance) -> float:
 
 def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     """Return the numbers of ``dance``; the weights of the segments are those of ``plan``, on top of their masses."""
-    parts = excitation_blocks(dance.body)
+    parts = excitation.excitation_blocks(dance.body)
     weight = parts.weight * plan.emphasis(dance.body.segments)
     holds = [phase for phase in dance.phases if phase.kind == "hold" and phase.stance.over is None]
-    ups = np.concatenate([uprights(dance.state(phase, np.array([phase.start]))) for phase in holds])
+    ups = np.concatenate([excitation.uprights(dance.state(phase, np.array([phase.start]))) for phase in holds])
     every = list(range(len(dance.body.segments)))
-    grams = static_grams(ups)
-    static, _ = total(weight, grams, parts.first)
+    grams = excitation.static_grams(ups)
+    static, _ = excitation.total(weight, grams, parts.first)
     blocks = {i: grams[i][np.ix_(parts.first[i], parts.first[i])] for i in every if parts.first[i] and weight[i] > 0}
-    poor = [i for i, block in blocks.items() if condition(block)[0] > POOR]
+    poor = [i for i, block in blocks.items() if excitation.condition(block)[0] > POOR]
     # Grows from move to move.
-    gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
+    # rad²/s³: so much is supposed before, and no condition number is infinite
+    gram = np.tile(0.01 * np.eye(6), (len(every), 1, 1))
     straight = replace(dance, via=straight_via(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []
     for phase in (phase for phase in dance.phases if phase.kind == "move"):
         time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * _PAPER_RATE) + 1)
         state = dance.state(phase, time)
-        gram = gram + dynamic_grams(state, every) / _PAPER_RATE
-        dynamic.append(total(weight, gram, parts.second)[0])
+        gram = gram + excitation.dynamic_grams(state, every) / _PAPER_RATE
+        dynamic.append(excitation.total(weight, gram, parts.second)[0])
         paths.append(ZmpPath(phase.posture - 1, phase.stance, straight.state(phase, time).zmp, state.zmp))
     pairs = (zip(weight, picks, strict=True) for picks in (parts.first, parts.second))
     first, second = (float(sum(w for w, pick in pair if pick)) for pair in pairs)

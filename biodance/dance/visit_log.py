@@ -15,7 +15,6 @@ from biodance.library import parse_json, refuse_large, refuse_special
 
 PATTERN = "dance_log*.json"
 """Names of logs beside the recordings of a visit."""
-_LARGEST = 2**22  # Bytes of a log: a hundred times one of forty postures
 _Percent = Annotated[float, Field(ge=0, le=100)]
 _Degrees = Annotated[float, Field(ge=-360, le=360)]
 
@@ -83,7 +82,7 @@ def read_visit_logs(folder: Path, dance: Dance) -> tuple[VisitLog, ...]:
     logs = []
     for path in sorted(Path(folder).glob(PATTERN)):
         refuse_special(path)
-        refuse_large(path, _LARGEST)
+        refuse_large(path, 2**22)  # bytes: a hundred times a log of forty postures
         try:
             found = _File.model_validate(parse_json(path.read_text(encoding="utf-8")))
         except (ValueError, ValidationError) as error:

@@ -35,17 +35,7 @@ from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
 from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.c3d.write import write_trial
-from biodance.lab.plates.faults import (
-    APPLIED,
-    DELAY,
-    GAIN,
-    OFFSET,
-    PLATE_FAULTS,
-    PlateCorrection,
-    corrected_trial,
-    corrections_text,
-    joined_corrections,
-)
+from biodance.lab.plates import faults
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, recorded_of, windows
 from biodance.pipeline.results import MendedCopy, SessionDiagnosis, SessionResult
@@ -67,8 +57,8 @@ class Written(NamedTuple):
 
 def write_corrected(
     session: Session,
-    earlier: tuple[PlateCorrection, ...],
-    accepted: tuple[PlateCorrection, ...],
+    earlier: tuple[faults.PlateCorrection, ...],
+    accepted: tuple[faults.PlateCorrection, ...],
     folder: Path,
     *,
     undone: Iterable[str] = (),
@@ -82,13 +72,13 @@ def write_corrected(
     """
     folder.mkdir()
     said = "".join(f"# {sentence}\n" for sentence in undone)
-    text = said + corrections_text(joined_corrections(earlier, accepted))
-    (folder / APPLIED).write_text(text, encoding="utf-8", newline="\n")
+    text = said + faults.corrections_text(faults.joined_corrections(earlier, accepted))
+    (folder / faults.APPLIED).write_text(text, encoding="utf-8", newline="\n")
     (folder / "session.toml").write_text(_session_toml(session), encoding="utf-8", newline="\n")
     written, refused = [], []
     for trial in session.trials:
         try:
-            write_trial(corrected_trial(trial, accepted), folder / f"{trial.name}.c3d")
+            write_trial(faults.corrected_trial(trial, accepted), folder / f"{trial.name}.c3d")
             written.append(trial.name)
         except BiodanceError as error:
             refused.append(f"Trial {trial.name} was not written corrected. {error}")
@@ -228,18 +218,18 @@ class _Corrected:
     kept: Residuals | None
 
 
-def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[PlateCorrection, ...]:
+def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[faults.PlateCorrection, ...]:
     """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
     out = []
     for one in findings:
-        fault = PLATE_FAULTS.get(one.effect)
+        fault = faults.PLATE_FAULTS.get(one.effect)
         size = {p.name: p for p in one.parameters}.get(fault.parameter) if fault else None
         if size is not None and np.isfinite(size.value):
-            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source, one.trials))
+            out.append(faults.PlateCorrection(one.effect, one.target, size.value, size.sd, source, one.trials))
     return tuple(out)
 
 
-_INSIDE = (OFFSET.name, DELAY.name, GAIN.name)
+_INSIDE = (faults.OFFSET.name, faults.DELAY.name, faults.GAIN.name)
 """Causes that statistics find and that are taken off before the body is fitted: zeros, clocks, gains."""
 
 

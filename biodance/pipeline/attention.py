@@ -163,9 +163,7 @@ _BROKEN = {
     CheckKind.MARKERS: "markers of {} lie {} from the body",
     CheckKind.WEIGHT: "the weight on the plates in {} is {} from the declared one",
 }
-"""Beginnings of the names of checks beside which nothing is "nothing wrong", unless a finding explains them, and what
-is said of them.
-"""
+"""Beginnings of the names of checks beside which nothing is "nothing wrong", and what is said of them."""
 _NOTED = ("fully measured",)
 """Checks that ask nobody for anything: what was not measured is not judged, which is said of every trial."""
 _ON_PLATES = ("wrench", "contact", "standing", "compare")
@@ -258,7 +256,9 @@ def open_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> t
     found += _noted(result)
     found += [line for trial in result.trials for line in _of_trial(trial, findings)]
     # a reader said of the weight what its check would say again, unless that points to a cause
-    told = not cause_of(CheckKind.WEIGHT, findings) and any(map(_weighed, result.trials))
+    told = not cause_of(CheckKind.WEIGHT, findings) and any(
+        isinstance(text, WrongWeight) for trial in result.trials for text in trial.reasons
+    )
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
     found += [_habit(one) for one in findings if one.cause.habit]
@@ -286,10 +286,6 @@ def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
         )
         for one in found
     )
-
-
-def _weighed(trial: TrialResult) -> bool:
-    return any(isinstance(text, WrongWeight) for text in trial.reasons)
 
 
 def _habit(one: Finding) -> Attention:

@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from biodance.diagnosis.foresight import Foresight
 
 
-_AS_MUCH = 1.1
-"""Times as much left of the table's standard deviation of a counterpart's mass: less is no effect of an emphasis."""
 _BEYOND = np.radians(3.1)  # rad that joints go beyond a limit in a person's file of which nobody need decide
 _FAR, _NEW = 3.0, 0.9
 """Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
@@ -174,7 +172,7 @@ class DanceResult:
             i, j = 10 * here, 10 * there
             alike = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
             # left of the table's sd on the other side, too: the emphasis taught both through their correlation
-            if after[there] / before[there] < _AS_MUCH * after[here] / before[here]:
+            if after[there] / before[there] < 1.1 * after[here] / before[here]:
                 said += f" Both, because a person's sides are alike (correlation in the table {alike:.2f})."
             out.append(said)
         return tuple(out)
@@ -271,10 +269,6 @@ def plate_sentence(dance: Dance, say: Say = in_english, number: Number = as_numb
     return f"{said} {made}"
 
 
-_ALIKE = 0.001
-"""m by which sides of plates differ from what is written of them."""
-
-
 def plates_too_small(dance: Dance, session: Session) -> str:
     """Return a sentence where a session's plates together cannot carry all feet of a dance; else ""."""
     fits = [trial for trial in session if trial.role == "fit"]
@@ -286,7 +280,8 @@ def plates_too_small(dance: Dance, session: Session) -> str:
     points = np.concatenate(corners)
     size = np.ptp(points @ np.column_stack([along, [-along[1], along[0]]]), axis=0)
     room = room_on_plates(dance.stances)
-    if any(np.all(room <= one + _ALIKE) for one in (size, size[::-1])):
+    # m by which sides of plates differ from what is written of them
+    if any(np.all(room <= one + 0.001) for one in (size, size[::-1])):
         return ""
     return (
         f"{plate_sentence(dance)} The plates of {session.folder} cover {size[0]:.2f} m by {size[1]:.2f} m, and frames "

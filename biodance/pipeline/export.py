@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 
 _NEWTONS_PER_METRE = 1000.0
-_MEASURED, _RESIDUAL, _SKIN = (0, 158, 115), (213, 94, 0), (180, 180, 190, 120)
 
 
 def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSolids | None = None) -> Path:
@@ -89,7 +88,7 @@ def _body(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body, s
             continue
         mesh = solids[name]
         surface = {"vertex_positions": mesh.vertices, "triangle_indices": mesh.faces}
-        shape = rerun.Mesh3D(**surface, vertex_normals=mesh.vertex_normals, albedo_factor=_SKIN)
+        shape = rerun.Mesh3D(**surface, vertex_normals=mesh.vertex_normals, albedo_factor=(180, 180, 190, 120))
         stream.log(f"lab/body/{name}", shape, static=True)
         turn = Rotation.from_matrix(pose.rotation[:, k]).as_quat()
         moved = rerun.Transform3D.columns(translation=pose.position[:, k], quaternion=turn)
@@ -105,11 +104,11 @@ def _forces(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body)
         corners = [np.vstack([plate.corners, plate.corners[:1]])]
         stream.log(f"lab/plates/{plate.name}", rerun.LineStrips3D(corners), static=True)
         cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)
-        arrows.append((plate.name, plate.wrench.time, plate.wrench.force, cop, _MEASURED))
+        arrows.append((plate.name, plate.wrench.time, plate.wrench.force, cop, (0, 158, 115)))
     if one.comparison is not None:
         found = one.comparison
         left = np.where(found.used[:, None], found.measured - predict_wrench(body, one.moved).value, np.nan)[:, :3]
-        arrows.append(("residual", found.time, left, centre_of_mass(body, one.moved), _RESIDUAL))
+        arrows.append(("residual", found.time, left, centre_of_mass(body, one.moved), (213, 94, 0)))
     for name, time, force, at, colour in arrows:
         known = np.isfinite(force).all(axis=1) & np.isfinite(at).all(axis=1)
         sized = {"vectors": force[known] / _NEWTONS_PER_METRE, "origins": at[known]}
@@ -399,7 +398,9 @@ def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tup
     if target.format not in FOLDERS:
         trial = _chosen(result.session, trial).name
     chosen = result.trials if trial is None else (result[trial],)
-    return target.trials(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, words)
+    # each prepared trial has a cut-off of its own; a session is written as it was asked for
+    trials = tuple(replace(one.trial, settings=result.settings) for one in chosen)
+    return target.trials(replace(result.session, trials=trials), chosen, body, words)
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:

@@ -29,7 +29,7 @@ from biodance.virtual_lab.movement.performance import (
 )
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.simulate import check_simulated, write_visit
+from biodance.virtual_lab.simulate import check_simulated
 from biodance.virtual_lab.simulate import simulate_session as write_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
@@ -46,8 +46,6 @@ LIFT = 0.4
 _OTHERS = "squat"
 """Protocol from which the static trial and the squats kept for validation are taken, of who stands."""
 _STILL = Performer(tracking=0.0, pace=1.0)
-_SITS = 4.0
-"""s of sitting still."""
 _BENT = {
     f"{side}_{joint}": math.radians(by) for side in SIDES for joint, by in (("hip_flexion", 90), ("knee_flexion", 85))
 }
@@ -78,7 +76,7 @@ def stretches(dance: Dance) -> tuple[Shown, ...]:
 
 def _on_the_stool(dance: Dance, danced: tuple[Shown, ...]) -> tuple[Shown, ...]:
     """Return what is recorded on a stool, too: sitting still (static), and a second round to validate on."""
-    x = np.zeros((round(_SITS * _RATE) + 1, dance.chain.size))
+    x = np.zeros((round(4.0 * _RATE) + 1, dance.chain.size))  # s of sitting still
     x[:, 2] = danced[0].seat
     stood = {side: zip(ARM, np.radians(STAND.values[f"{side}_arm"]), strict=True) for side in SIDES}
     arms = {f"{side}_{name}": angle for side, pairs in stood.items() for name, angle in pairs}
@@ -147,7 +145,8 @@ def simulate_dance(
         )
         return replace(done, forces=instruments.visit.forces)
 
-    return write_visit(subject, plan, out, performed, seed=seed, loads=loads, visit=visit, bent=_BENT if seated else {})
+    bent = _BENT if seated else {}
+    return write_session(subject, plan, out, seed=seed, loads=loads, visit=visit, performed=performed, bent=bent)
 
 
 def design_dance(

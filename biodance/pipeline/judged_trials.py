@@ -20,10 +20,7 @@ _ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
 TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
 """Why a trial with measured contact is not looked at."""
-_STATIC = "quiet standing tells nothing beside so much movement"
-_KEPT = "kept to measure what a finding gains"
 _POSTURES = "its rows are postures: identified from, and nothing told of movement, clocks or plates"
-_NEVER = "it holds no measured ground contact"
 _DIFFERENT = "plates and motion differ by more than a wrong body can make of it, in most of what is measured."
 
 
@@ -46,9 +43,7 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
 
 
 def _with_every_plate(trial: Trial, every: Mapping[str, Plate]) -> Trial:
-    """Return a trial with all plates of its session: one that its reader left out carried nothing there, and what it
-    read is not known, so that no cause of it shows.
-    """
+    """Return a trial with all plates of its session: one that its reader left out carried nothing there."""
     own = {plate.name: plate for plate in trial.plates}
     if not own or own.keys() == every.keys():
         return trial
@@ -124,9 +119,9 @@ def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, .
         if name in looked_at:
             reason = ""
         elif "fit" in roles and role not in ("fit", "static"):
-            reason = _KEPT
+            reason = "kept to measure what a finding gains"
         elif role == "static" and roles:
-            reason = _STATIC
+            reason = "quiet standing tells nothing beside so much movement"
         else:
             reason, missed = why.get(name) or " ".join(one.reasons) or _no_frame(one), True
         rows.append(Judged(name, one.compared_s if name in looked_at else 0.0, reason, missed, one.left_out))
@@ -136,7 +131,7 @@ def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, .
 def _no_frame(one: TrialResult) -> str:
     """Return why nothing of a trial that gives no other reason is looked at."""
     if one.comparison is None or not one.comparison.used.any():
-        return _NEVER
+        return "it holds no measured ground contact"
     largest = max(one.left_out, key=lambda reason: one.left_out[reason], default=LeftOut.SHORT_RUN)
     return _DIFFERENT if largest is LeftOut.FORCES_DIFFER else TOO_SHORT
 

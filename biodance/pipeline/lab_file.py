@@ -9,13 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from biodance.cycles.scores import DeviationReference, NormalCurve, deviation_of, normal_of
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.plates.faults import (
-    PlateCorrection,
-    corrected_session,
-    corrections_text,
-    joined_corrections,
-    read_corrections,
-)
+from biodance.lab.plates import faults
 from biodance.library import read_toml
 from biodance.records import Session
 from biodance.uncertainty.tolerances import Tolerances, shipped, tolerances_of
@@ -39,12 +33,12 @@ class HealthyReference:
 class LabFile(HealthyReference):
     """What a lab.toml says: ``corrections`` of the plates, own ``tolerances`` or None, and the reference."""
 
-    corrections: tuple[PlateCorrection, ...] = ()
+    corrections: tuple[faults.PlateCorrection, ...] = ()
     tolerances: Tolerances | None = None
 
     def corrected(self, session: Session) -> Session:
         """Return a session as read, corrected."""
-        return corrected_session(session, self.corrections) if self.corrections else session
+        return faults.corrected_session(session, self.corrections) if self.corrections else session
 
 
 NO_LAB = LabFile()
@@ -56,7 +50,7 @@ def read_lab(path: str | Path | None) -> LabFile:
     """
     if path is None:
         return NO_LAB
-    corrections = read_corrections(path)
+    corrections = faults.read_corrections(path)
     whole = read_toml(Path(path))
     if fault := lab_fault(whole):
         raise FileRefused(f"{path}: {fault}. Give a lab.toml that biodance learn or diagnose --accept wrote.")
@@ -72,17 +66,16 @@ def read_lab(path: str | Path | None) -> LabFile:
         raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
 
 
-def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrection, ...]) -> str:
+def lab_text(earlier: tuple[faults.PlateCorrection, ...], accepted: tuple[faults.PlateCorrection, ...]) -> str:
     """Return the lab.toml of ``earlier`` corrections and of those ``accepted`` that last; "" for nothing."""
     lasting = tuple(one for one in accepted if one.fault.lasting)
-    return corrections_text(joined_corrections(earlier, lasting))
+    return faults.corrections_text(faults.joined_corrections(earlier, lasting))
 
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Finite = Annotated[float, Field(ge=-1e12, le=1e12)]
 _Row = Annotated[list[Finite], Field(min_length=6, max_length=6)]
 _Squares = Annotated[list[Annotated[float, Field(gt=0, le=1e12)]], Field(min_length=6, max_length=6)]
-_Words = Annotated[str, Field(max_length=10_000)]
 _PerCent = Annotated[list[float], Field(min_length=2, max_length=101)]
 
 
@@ -99,7 +92,7 @@ class _Instruments(_Table):
 
 
 class _Tolerances(_Table):
-    origin: _Words
+    origin: Annotated[str, Field(max_length=10_000)]
     movement: list[_Squares] = Field(max_length=100)
     noise: list[Annotated[list[_Row], Field(min_length=6, max_length=6)]] = Field(max_length=100)
     sizes: dict[str, Annotated[float, Field(ge=0, le=1e6)]] = {}

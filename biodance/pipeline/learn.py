@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.cycles import EMG
+from biodance.cycles import EMG, scores
 from biodance.cycles.curves import CurveGroup
-from biodance.cycles.scores import (
-    FEATURES,
-    deviation_reference,
-    gait_vectors,
-    normal_curves,
-)
 from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge_archive
 from biodance.diagnosis.archive.norms import (
@@ -200,10 +194,6 @@ def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     return found
 
 
-_FEWEST_LEGS = 6
-"""Healthy legs without which nothing is said of how far healthy people lie apart: both of three people."""
-
-
 @dataclass(frozen=True, eq=False)
 class MeasuredWalk:
     """How one ``person`` moved in a ``session``: ``curves`` over all good repetitions, ``beside`` those of plug-in
@@ -222,7 +212,7 @@ def measured_walk(result: SessionResult, session: str) -> MeasuredWalk:
     moved = describe_movement(result)
     groups = (group for one in moved.repetitions.values() for group in one.groups)
     curves = tuple(group for group in groups if not group.quantity.endswith(EMG))
-    found = gait_vectors(moved.gait.curves) if moved.gait else {}
+    found = scores.gait_vectors(moved.gait.curves) if moved.gait else {}
     by_side = {side: [vector for cycle, vector in found.items() if cycle.side == side] for side in SIDES}
     vectors = {side: np.stack(rows) for side, rows in by_side.items() if rows}
     beside = moved.gait.beside if moved.gait else ()
@@ -240,17 +230,17 @@ def healthy_reference(healthy: Sequence[MeasuredWalk], everybody: Sequence[Measu
             legs.setdefault((one.person, side), []).extend(rows)
     strides = [row for one in everybody for rows in one.vectors.values() for row in rows]
     # as many features (singular vectors) as that cannot be found in fewer strides
-    enough = len(strides) >= FEATURES and len(legs) >= _FEWEST_LEGS
+    # both of three people tell how far the healthy lie apart
+    enough = len(strides) >= scores.FEATURES and len(legs) >= 6
     means = [np.mean(rows, axis=0) for rows in legs.values()]
-    deviation = deviation_reference(np.stack(strides), np.stack(means)) if enough else None
-    return HealthyReference(normal_curves(people), normal_curves(beside), deviation)
+    deviation = scores.deviation_reference(np.stack(strides), np.stack(means)) if enough else None
+    return HealthyReference(scores.normal_curves(people), scores.normal_curves(beside), deviation)
 
 
 _WORTH = 5.0
 """Sessions that the shipped tolerances count for (docs/decisions/2026-11-22-a-laboratory-learns.md)."""
 FEWEST = 3
 """Sessions without which nothing is learned."""
-ROUNDS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,7 +405,7 @@ def learned_together(
             f"{FEWEST} are needed. {why}"
         )
     nulls, created = [one.null for one in sessions], now()
-    found = without_habits(learn_tolerances(nulls, shipped(), rounds=ROUNDS, worth=_WORTH))
+    found = without_habits(learn_tolerances(nulls, shipped(), rounds=10, worth=_WORTH))
     origin = (
         f"{len(sessions)} sessions of {archive.resolve().name}, {created[:10]}, beside the shipped sizes as "
         f"{_WORTH:g} sessions more"

@@ -15,15 +15,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.diagnosis.watch import (
-    LiveWarning,
-    MarkerWatch,
-    WrenchWatch,
-    loaded_while_empty,
-    said_of_jump,
-    said_of_markers,
-    silent_plates,
-)
+from biodance.diagnosis import watch
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability, RecursivePosterior, initial_posterior
@@ -47,10 +39,6 @@ from biodance.uncertainty.caution import widened_prior
 
 _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
-_RECENT = 0.25
-"""s of markers that are judged at once."""
-_SLOW = 10.0
-"""Samples of the running posterior count as if only so many-th of them were independent: errors last about a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +62,7 @@ class LiveResult:
     fit: Fit | None
     identification: Identification | None
     cause: str
-    warnings: tuple[LiveWarning, ...]
+    warnings: tuple[watch.LiveWarning, ...]
     frame_s: Array
     wall_s: Array
     state: LiveState
@@ -120,7 +108,7 @@ class LiveSession:
         self._believed(part, stood, np.ones(time.size, dtype=bool))
 
     @property
-    def warnings(self) -> tuple[LiveWarning, ...]:
+    def warnings(self) -> tuple[watch.LiveWarning, ...]:
         """All that was noticed, in time."""
         return tuple(self._watch.warnings)
 
@@ -135,7 +123,7 @@ class LiveSession:
     def _now(self) -> float:
         return float(self.markers.time[max(len(self._q) - 1, 0)])  # s, of the last frame that came
 
-    def push(self) -> tuple[LiveWarning, ...]:
+    def push(self) -> tuple[watch.LiveWarning, ...]:
         """Take in the next frame and return what it gave reason to warn of."""
         frame, before = len(self._q), len(self.warnings)
         q, distance, determined = self._follower.follow(self._xyz[frame])
@@ -143,7 +131,8 @@ class LiveSession:
         self._distance.append(distance)
         self._determined.append(determined)
         if (frame + 1) % self._hop == 0:
-            recent = np.array(self._distance[-max(3, round(_RECENT * self.markers.rate)) :])
+            # s of markers that are judged at once
+            recent = np.array(self._distance[-max(3, round(0.25 * self.markers.rate)) :])
             self._watch.look_at_markers(self._now, self._xyz[frame], recent)
         # a window is begun only when the one before is done: late work must not pile up
         if self._work is None and frame + 1 >= self._window and (frame + 1 - self._window) % self._hop == 0:
@@ -229,7 +218,8 @@ class LiveSession:
         fit = Fit("stream", part, wrench, use & (not self._watch.suspect), self.trial.settings.outlier)
         if fit.use.any():  # the last used frame stands for all of the window: errors last longer than it
             last = int(np.flatnonzero(fit.use)[-1])
-            variance = _SLOW * self._watch.wrench.noise(self.posterior)
+            # errors last about a second: one sample in ten is independent
+            variance = 10.0 * self._watch.wrench.noise(self.posterior)
             self.posterior = self.posterior.updated(W[last], fit.wrench.value[last], variance)
         points = fit.wrench.cop()[fit.use]
         loaded = points[np.isfinite(points).all(axis=1)]  # their sum and number give the mean
@@ -271,21 +261,17 @@ class LiveSession:
         return Fit("stream", motion, wrench, use, settings.outlier, cutoff=highest_frequency(settings))
 
 
-_EMPTY = 0.3
-"""s that nobody is on a plate which is called empty: the filter forgets a foot that left in a tenth of that."""
-
-
 class StreamWatch:
     """Looks at a stream as it comes. ``warnings`` all that was noticed, each once; ``suspect`` what is wrong now."""
 
     def __init__(self, trial: Trial, follower: Follower, *, weight: float) -> None:
         self.trial, self._follower, self._weight = trial, follower, weight
-        self._markers = MarkerWatch(np.zeros(len(follower.names)))
-        self.wrench = WrenchWatch(weight)
+        self._markers = watch.MarkerWatch(np.zeros(len(follower.names)))
+        self.wrench = watch.WrenchWatch(weight)
         self._sound = follower.q
         self._point: Array | None = None
-        self._suspect: dict[str, LiveWarning] = {}
-        self.warnings: list[LiveWarning] = []
+        self._suspect: dict[str, watch.LiveWarning] = {}
+        self.warnings: list[watch.LiveWarning] = []
 
     @property
     def suspect(self) -> tuple[str, ...]:
@@ -304,7 +290,7 @@ class StreamWatch:
         # the five markers furthest from the body, of which two may have changed names
         last = np.nan_to_num(distances[-1])
         worst = [self._follower.names[i] for i in np.argsort(-last)[:5] if last[i] > 0]
-        self._warn("markers", said_of_markers(now, worst, self._follower.exchange(xyz, worst, self._sound)))
+        self._warn("markers", watch.said_of_markers(now, worst, self._follower.exchange(xyz, worst, self._sound)))
 
     def look_at_plates(
         self, now: float, raw: Trial, plates: Sequence[Plate], on_plate: NDArray[np.bool_], *, until: int
@@ -312,9 +298,10 @@ class StreamWatch:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it: channels ``raw`` and as
         filtered in ``plates``, feet ``on_plate`` (T, 2, P); frames from ``until`` on are not settled yet.
         """
-        fell = silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
+        fell = watch.silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
         silent = {f"silent {said.target}": said for said in fell}
-        count = max(3, round(_EMPTY * plates[0].wrench.rate))
+        # the filter forgets a foot that left in a tenth of 0.3 s
+        count = max(3, round(0.3 * plates[0].wrench.rate))
         late = slice(max(0, until - count), until)
         gone = {said.target for said in self.warnings if said.effect == "plate_gone"}
         empty = {
@@ -323,7 +310,7 @@ class StreamWatch:
             if until >= count
             and plate.name not in gone
             and not on_plate[late, :, index].any()
-            and (said := loaded_while_empty(now, plate, plate.wrench.value[late]))
+            and (said := watch.loaded_while_empty(now, plate, plate.wrench.value[late]))
         }
         still = {f"silent {plate.name}" for plate in raw.plates if not np.diff(plate.wrench.value, axis=0).any()}
         for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
@@ -350,9 +337,9 @@ class StreamWatch:
         if found is None:
             self._suspect.pop("wrench", None)
         elif "wrench" not in self._suspect:
-            self._warn("wrench", said_of_jump(now, self.trial.plates, self._point, *found))
+            self._warn("wrench", watch.said_of_jump(now, self.trial.plates, self._point, *found))
 
-    def _warn(self, key: str, said: LiveWarning) -> None:
+    def _warn(self, key: str, said: watch.LiveWarning) -> None:
         known = {(w.effect, w.target) for w in self.warnings}
         self._suspect[key] = said
         if (said.effect, said.target) not in known:
@@ -461,7 +448,7 @@ def replay(
     *,
     real_time: bool = False,
     tell: Callable[[LiveState], None] = lambda _: None,
-    warn: Callable[[LiveWarning], None] = lambda _: None,
+    warn: Callable[[watch.LiveWarning], None] = lambda _: None,
 ) -> LiveResult:
     """Return what a stream of the frames of ``trial`` (of which only its own set's markers are kept) tells of ``body``.
 

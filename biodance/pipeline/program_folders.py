@@ -168,8 +168,6 @@ def state_notes(motion: Motion) -> tuple[str, ...]:
 MODEL = "model.osim"
 _ENDS = (".trc", ".mot", "_forces.mot", "_ExternalLoads.xml", "_InverseDynamics.xml", "_torques.sto")
 """Of the names of a trial's files."""
-_SHORTEST = 10
-"""Frames without which no inverse dynamics is set up."""
 
 
 @dataclass(frozen=True)
@@ -234,7 +232,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files.append(write_whole(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
     # The longest run of frames in which plates and markers tell all; None where it is too short.
     first, stop = longest_run(contact.measured & motion.determined)
-    if stop - first < _SHORTEST:
+    if stop - first < 10:  # frames
         return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
     span, between = slice(first, stop), (float(motion.time[first]), float(motion.time[stop - 1]))
     setup = inverse_dynamics_setup(

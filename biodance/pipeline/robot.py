@@ -30,11 +30,6 @@ from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, elementary_rotation, quaternion_matrix, wrench_about_point
 
-_MISWEIGHED = 0.02
-"""Of its weight: by so much the identified robot may differ from what the plate carries."""
-_APART = 1.0
-"""s: clocks further apart are said first."""
-
 
 def of_file(notes: tuple[str, ...]) -> list[Attention]:
     """Return what was made of the robot's file."""
@@ -50,7 +45,7 @@ def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
             f"What the encoders show at t the plate shows at t {late:+.3f} s; brought together by the motion "
             f"(correlation {one.plate.correlation:.3f})."
         )
-        out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, TimeDelay.name))
+        out.append(Attention("warn" if abs(late) > 1.0 else "note", clocks, name, TimeDelay.name))  # s
         if one.innovation > ODD:
             words = (
                 f"The plate differs from the drawing by {one.innovation:.1f} times what its masses may be off by: look "
@@ -114,7 +109,8 @@ def misweighed(found: SessionIdentification) -> list[Attention]:
             f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
             f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
         )
-        out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > _MISWEIGHED * needed)
+        # of the weight
+        out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > 0.02 * needed)
     return out
 
 
@@ -143,8 +139,6 @@ def weights(done: Identification) -> list[Attention]:
     return [Attention("note", text, "", "mass") for text in out]
 
 
-_KEPT = 0.2
-"""Share of every trial, at its end, that is kept where no trial is."""
 _NEAR = 0.3
 """s: clocks that were brought together are not moved further for validation."""
 _SLOW = 1.0
@@ -257,9 +251,7 @@ def identify_robot(
 def _identified(
     body: Body, name: str, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]
 ) -> tuple[SessionIdentification, BaseEstimate]:
-    """Identify from the ``fitted`` trials, beside what drawing and identified robot predict of every trial; and the
-    base parameters as `RobotResult.alone`.
-    """
+    """Identify from the ``fitted`` trials, with what is predicted of every trial; and the base parameters alone."""
     done, alone = identify_links(body, tuple(fitted))
     search = LoadSearch((), float("nan"), "the drawing", doubts=(_NO_SEARCH,))
     one = SessionIdentification(name, done, (), (), {}, None, search, notes=done.notes)
@@ -292,7 +284,7 @@ def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], li
     for one in fitted:
         # cut where the last share of what may be used begins, not of all that was recorded
         use = np.flatnonzero(one.fit.use)
-        cut = use[int((1 - _KEPT) * use.size)] if use.size else 0
+        cut = use[int(0.8 * use.size)] if use.size else 0  # the last fifth of every trial
         early = np.arange(one.fit.use.size) < cut
         first.append(replace(one, fit=replace(one.fit, use=one.fit.use & early)))
         last.append(replace(one, fit=replace(one.fit, use=one.fit.use & ~early)))

@@ -40,8 +40,6 @@ _WEIGHTS = (0.5, 2.0)
 """Legal weight on the plate over that of the drawing."""
 ODD, _FAITHFUL = 1.6, 0.99
 """Beyond this surprise, or below this correlation, exchanged columns are looked for, and another standing foot."""
-_BETTER = 0.25
-"""They are named if, exchanged back, they leave so much of what the correlation lacks to one."""
 _COARSE, _PARTED = 20.0, 0.5
 """Hz at which exchanged columns and other standing feet are looked for; s by which stretches of these are parted."""
 _SLOW = LowPass(cutoff=0.2 * _COARSE)
@@ -207,7 +205,8 @@ def _exchanged(
     low, high = limits[0] - 0.35, limits[1] + 0.35
     inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
     moving = few.std(axis=0) > 0.01
-    best, pair = min(_BETTER * _correlation_deficit(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
+    # exchanged back, they leave a quarter of what the correlation lacks to one
+    best, pair = min(0.25 * _correlation_deficit(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
     for i, j in combinations(range(few.shape[1]), 2):
         if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
             continue

@@ -87,8 +87,6 @@ SCALED = "scaled_body.json"
 """The same where nothing was identified: scaled, with the table's parameters; nobody's earlier body (``--body``)."""
 MOTIONS = "motions.npz"
 """File in which they keep the motions, and where the recordings lie."""
-_LARGEST = 2**33
-"""Bytes of it, unpacked: some eight hours of movement at 200 Hz."""
 _TEXTS = ("marker_names", "notes", "joint_names")
 
 
@@ -171,7 +169,8 @@ def read_kept(folder: Path) -> KeptResults:
         raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder instead.")
     refuse_mixture(folder, (MOTIONS,))
     try:
-        refuse_large(folder / MOTIONS, _LARGEST)
+        # bytes, unpacked: eight hours of movement at 200 Hz
+        refuse_large(folder / MOTIONS, 2**33)
         with open(folder / MOTIONS, "rb") as stream, np.load(stream, allow_pickle=False) as held:
             motions = {str(name): _motion(held, k) for k, name in enumerate(held["trials"])}
             hashes = dict(zip(motions, (str(one) for one in held["hashes"]), strict=True))

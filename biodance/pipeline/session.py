@@ -64,10 +64,7 @@ def _examined(
 def _placed(
     session: Session, read: tuple[TrialResult, ...], known: Body | None, earlier: SessionResult | None
 ) -> Placed:
-    """Return who moves in the prepared trials ``read`` of a session; the body of an ``earlier`` examination where its
-    trials have the same markers, and nothing else carries in other frames. SessionRefused where the ``known`` body is
-    of another person.
-    """
+    """Return who moves in the trials ``read``; the ``earlier`` body where nothing of it has changed."""
     subject = session.subject
     hidden = tuple(  # frames of each trial in which something else carries, so that they place no joint
         carried_elsewhere(one.trial, weight=one.trial.settings.gravity * subject.mass)

@@ -98,17 +98,13 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     return np.stack([np.stack(line[:2], axis=1) for line in lines], axis=1), tuple(line[2] for line in lines)
 
 
-_AROUND = 48
-"""Points of an outline."""
-
-
 def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[str, Array, Array]]:
     """Return by segment what ``eye`` sees of postures (T, nq): outlines (T, n, 2) m, across and up, how near (T,) m.
 
     An outline joins the points in which the solid of a box (`body.solids`) touches lines of every direction.
     """
     pose, out = poses(body, q), []
-    angle = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
+    angle = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
     # rows: across is the horizontal at right angles to the eye's direction, up is the lab's z
     seen = np.array([[-eye[1], eye[0], 0.0], [0.0, 0.0, 1.0]])
     outward = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ seen

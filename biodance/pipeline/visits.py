@@ -135,10 +135,6 @@ def _compared(about: _About, seen: Sequence[Sequence[KeyValue]]) -> ComparedQuan
     )  # fmt: skip
 
 
-BODY_KIND = "body"
-"""Where the cycles of other quantities have their kind."""
-
-
 def mass_quantities(
     visits: Sequence["ExaminedVisit"], *, tell: Callable[[str], None]
 ) -> tuple[list[ComparedQuantity], list[str]]:
@@ -187,7 +183,8 @@ def _mass(
 ) -> ComparedQuantity:
     """Return a mass ``of`` the body, ``seen`` in each visit with its interval, and interval and p of its change."""
     return ComparedQuantity(
-        kind=BODY_KIND, quantity=f"{of}_mass", key="", side=side, unit="kg",
+        # where the cycles of other quantities have their kind
+        kind="body", quantity=f"{of}_mass", key="", side=side, unit="kg",
         values=tuple(one[0] if one else None for one in seen),
         ci95=tuple(one[1] if one else None for one in seen),
         counts=(0,) * len(seen),

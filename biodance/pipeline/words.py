@@ -65,8 +65,6 @@ def first_upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-_SHORT = 8
-"""Words of advice that fit into a headline."""
 _LISTED = "See what stands below."
 
 
@@ -89,7 +87,8 @@ def spoken(finding: Finding, others: Sequence[Finding] = (), *, proven: bool = F
         at = f" at {place_in_words(finding.target)}" if finding.target else ""
         do = finding.advice.split(". ")[0].rstrip(".")
         fact = f"a {name} was found{at}{f', {size.value}' if size.value else ''}"
-        return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= _SHORT else _LISTED)
+        # words fit into a headline
+        return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= 8 else _LISTED)
     whole, _, channel = finding.target.rpartition(":")
     first, _, other = channel.partition("->")
     of = listed(finding.trials) or place_in_words(finding.target)

@@ -40,7 +40,6 @@ _VIEWS: _Eyes = ((N_("from the front"), (1.0, 0.0)), (N_("from the right"), (0.0
 """Where the eye is in the horizontal plane, for a person who faces lab x."""
 _TALL, _GAP, _LABEL = 150.0, 12.0, 70.0
 """Height of the picture in its own units, what is left between the views, and the room that their words take."""
-_MIDDLE = "#8d99a6"
 
 
 def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS, stance: Stance | None = None) -> str:
@@ -63,7 +62,7 @@ def mannequin_svg(body: Body, q: Array, title: str, eyes: _Eyes = _VIEWS, stance
         drawn += [f'<polyline points="{path(line)}" fill="none" stroke="#46535f" stroke-width="2"/>' for line in lines]
         for name, (outline,), _ in sorted(parts, key=lambda one: float(one[2][0])):
             side = name.partition("_")[0]
-            colour = _MIDDLE if side not in SIDE_COLOURS or side == "middle" else SIDE_COLOURS[side][0]
+            colour = "#8d99a6" if side not in SIDE_COLOURS or side == "middle" else SIDE_COLOURS[side][0]
             drawn.append(f'<polygon points="{path(outline)}" fill="{colour}"/>')
         drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
         left += room + _GAP

@@ -237,10 +237,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
     """Write ``report.html``, ``results.json``, ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
     document = plates_document(found)
-    texts = {
-        "report.html": plates_page(found, document),
-        "plates.csv": csv_text(found.table()),
-    }
+    texts = {"report.html": plates_page(found, document), "plates.csv": csv_text(found.table())}
     return write_results(folder, document, texts)
 
 
@@ -299,9 +296,6 @@ def learned_document(found: LearnedLaboratory) -> Row:
     }
 
 
-_SIZE = re.compile(r'^"(?P<key>[^"]+)" = (?P<value>[-+.\deE]+)$')
-
-
 def lab_file_text(found: LearnedLaboratory) -> str:
     """Return the text of lab.toml."""
     head = [
@@ -328,7 +322,7 @@ def _tolerances(found: LearnedLaboratory) -> list[str]:
     lines, before, within = [], shipped(), ""
     for line in to_toml(found.tolerances, under="tolerances").splitlines():
         within = line if line.startswith("[") else within
-        if within == "[tolerances.sizes]" and (size := _SIZE.match(line)):
+        if within == "[tolerances.sizes]" and (size := re.match(r'"(?P<key>[^"]+)" = (?P<value>[-+.\deE]+)$', line)):
             key, count = size["key"], found.shown.get(size["key"], 0.0)
             basis = f"{count:.1f} values in {len(found.sessions)} sessions; shipped {before.size(key):.4g}"
             line = f"{line}  # {'as shipped: no session shows it' if count < HARDLY else basis}"

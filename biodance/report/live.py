@@ -31,7 +31,6 @@ KNOWN_ROW = Schema(
     "segment quantity unit value sd low=interval.0 high=interval.1 verdict",
     shown="segment: {segment:name} | mass (kg): {value:2} | 95 % interval: {low:2} to {high:2} | verdict: {verdict}",
 )
-_WARNING = Schema("time_s effect target text")
 
 
 def live_document(found: LiveResult) -> Row:
@@ -46,7 +45,7 @@ def live_document(found: LiveResult) -> Row:
         "frames_used": int(found.fit.use.sum()) if found.fit else 0,
         "frame_ms": cores | {"wall": wall},
         "known": KNOWN_ROW.rows(known for known in (one.known if one else ()) if known.quantity in ASKED),
-        "warnings": _WARNING.rows(found.warnings),
+        "warnings": Schema("time_s effect target text").rows(found.warnings),
         "next": found.state.advice,
         "cause": found.cause,
     }
@@ -88,7 +87,6 @@ _HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
 }
-_LAST = 2.0  # s that the end waits for the page to fetch it
 
 
 class LivePage:
@@ -138,7 +136,7 @@ class LivePage:
         self._tell(end=cause or "The recording has ended.")
         self._fetched.clear()
         if self._watched:
-            self._fetched.wait(_LAST)
+            self._fetched.wait(2.0)  # s for the page to fetch the end
 
     def __enter__(self) -> "LivePage":
         """Return the page itself."""

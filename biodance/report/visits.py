@@ -126,7 +126,6 @@ def visit_place(one: Row) -> str:
 
 
 COMPARE_PAGE = "compare.html"
-_COLOURS = {"right": BLUE, "left": RED, "middle": BLUE}
 _DASHES = ("5 3", "2 2", "8 3 2 3", "1 3")  # Of all visits but the last, in turn
 
 
@@ -134,7 +133,7 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     """Return a panel a quantity with the mean and sd of every visit; "" where none is known in two visits."""
     # the last visit is drawn full in the side's colour, the others grey and dashed
     looks = [svg.Stroke(GREY, _DASHES[k % len(_DASHES)]) for k in range(len(found.visits) - 1)]
-    looks, cells = [*looks, svg.Stroke(_COLOURS[side], "", 1.6)], []
+    looks, cells = [*looks, svg.Stroke({"right": BLUE, "left": RED, "middle": BLUE}[side], "", 1.6)], []
     by_visit = [{(one.kind, one.quantity, one.side): one for one in groups} for groups in found.curves()]
     for quantity in quantities:
         some = [groups.get((kind, quantity, side)) for groups in by_visit]

@@ -14,16 +14,10 @@ from biodance.records import Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.person import Person, reference_angles, skeleton
 
-SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
-"""mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
 SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
 """Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity.
 Judgement, set so that fast squats leave residuals of the size of those in Bonnet et al. (2016, Table II).
 """
-BONY = 16.0
-"""Hz, the same where bone lies under the skin: all other markers."""
-DRIFT = 0.0005
-"""m rms per axis, slower than 0.5 Hz."""
 
 
 TISSUES = {"pulled": (1.0, 1.0, 0.0), "swinging": (0.4, 3.0, 0.0), "wavy": (0.3, 1.0, 1.0)}
@@ -61,12 +55,13 @@ def draw_soft_tissue(person: Person, session: int, tolerances: skeleton.LabToler
         side = "right" if name.startswith("R") else "left"
         pulls = dict(skeleton.virtual_people()["pull_mm_rad"][kind])
         if name.endswith(("SHO", "BAK")):
-            pulls |= SHOULDER_PULL
+            # mm per rad: the shoulder blade slides on the thorax
+            pulls |= {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
         for joint, millimetres in pulls.items():
             full = joint if joint in joints else f"{side}_{joint}"
             # Three independent components: the length of the vector has the given root mean square.
             scale[joints.index(full), k] = 0.001 * millimetres / np.sqrt(3.0)
-        swing[k] = 2 * np.pi * SWING.get(name[1:], BONY)
+        swing[k] = 2 * np.pi * SWING.get(name[1:], 16.0)  # Hz where bone lies under the skin
     own, day = skeleton.stream(person.seed, "soft tissue"), skeleton.stream(person.seed, "soft tissue", str(session))
     share = tolerances.soft_tissue_day
     shape = (*scale.shape, 3)
@@ -117,12 +112,8 @@ def skin_displacement(
     local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
     if np.any(tissue.sag):
         drift = skeleton.smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
-        local += DRIFT * drift.reshape(time.size, len(markers.names), 3)
+        local += 0.0005 * drift.reshape(time.size, len(markers.names), 3)  # m rms per axis
     return np.einsum("tkij,tkj->tki", turn, local)
-
-
-LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
-"""s."""
 
 
 def film(
@@ -153,7 +144,7 @@ def film(
         # Poisson: independent gaps, so many a minute in the mean.
         for _ in range(rng.poisson(tolerances.gaps_per_minute * (time[-1] - time[0]) / 60.0)):
             first, marker = int(rng.integers(0, time.size)), int(rng.integers(0, xyz.shape[1]))
-            xyz[first : first + int(rng.uniform(SHORTEST_GAP, LONGEST_GAP) / step), marker] = np.nan
+            xyz[first : first + int(rng.uniform(0.05, 0.30) / step), marker] = np.nan  # s
     return Markers(markers.names, time, xyz)
 
 

@@ -185,14 +185,12 @@ def mains_hum(channel: Channel, amplitude: float) -> Array:
     return channel.load + np.sin(2 * np.pi * 50 * np.arange(len(channel.load)) / channel.rate) * amplitude
 
 
-_SLACK = (10.0, 20.0, 40.0)  # N, half widths of the plays in the plate's joints; a third of it in N·m
-
-
 @on_channel
 def plate_hysteresis(channel: Channel, width: float) -> Array:
     """Follow the load in a loop of half ``width`` (N or N·m): part of it passes through joints with play."""
     load, loops = channel.load, []
-    for slack in np.array(_SLACK) * (1.0 if channel.force else 0.33):
+    # N, half the plays in the plate's joints
+    for slack in np.array((10.0, 20.0, 40.0)) * (1.0 if channel.force else 0.33):
         # a joint with play moves only when pushed by its slack
         through, place = np.empty_like(load), load[0]
         for k, value in enumerate(load):

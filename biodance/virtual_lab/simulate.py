@@ -63,11 +63,14 @@ def simulate_session(
     seed: int,
     loads: tuple[AddedLoad, ...] = (),
     visit: LabVisit = FIRST_VISIT,
+    performed: Callable[[Instruments, Person, TrialPlan], Performance] = perform_in,
+    bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
     ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``.
-    ``loads`` are carried on top of the subject's mass. The same arguments write the same bytes.
+    ``loads`` are carried on top of the subject's mass. Every trial is ``performed``; markers were glued on somebody
+    with joints ``bent`` by so many rad. The same arguments write the same bytes.
 
     Raises
     ------
@@ -77,28 +80,6 @@ def simulate_session(
         There is no such protocol.
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
-    return write_visit(subject, plan, out, perform_in, seed=seed, loads=loads, visit=visit)
-
-
-def write_visit(
-    subject: Subject,
-    plan: Protocol,
-    out: Path,
-    performed: Callable[[Instruments, Person, TrialPlan], Performance],
-    *,
-    seed: int,
-    loads: tuple[AddedLoad, ...] = (),
-    visit: LabVisit,
-    bent: Mapping[str, float] = MappingProxyType({}),
-) -> Path:
-    """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its
-    folder; markers were glued on somebody with joints ``bent`` by so many rad.
-
-    Raises
-    ------
-    BiodanceError
-        The folder is not empty, or the subject is outside the range that the virtual body covers.
-    """
     check_simulated(subject)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
@@ -119,34 +100,20 @@ def write_visit(
     masses = {part: SWINGING * person.body.sip.mass[TRUE_SEGMENTS.index(on)] for part, on in swinging.items()}
     flesh = (wobbling_mass(person, part, mass) for part, mass in masses.items())
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *flesh)))
+    performances, declared = [], scale_reading(person, visit.number, visit.tolerances)
     with whole_folder(out) as part:
-        _write(plan, person, instruments, visit, performed, part)
+        for trial in plan.trials:
+            performances.append(performed(instruments, person, trial))
+            recording = record(performances[-1], instruments)
+            for fault in visit.faults:
+                recording = fault(recording)
+            declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
+            write(recording, part)
+        (part / "session.toml").write_text(session_toml(person, plan, declared, joints=visit.laboratory.joints))
+        (part / TRUTH).mkdir()
+        document = truth(person, plan.name, instruments, performances)
+        (part / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
     return out
-
-
-def _write(
-    plan: Protocol,
-    person: Person,
-    instruments: Instruments,
-    visit: LabVisit,
-    performed: Callable[[Instruments, Person, TrialPlan], Performance],
-    out: Path,
-) -> None:
-    """Write the recordings, session.toml and the truth into the folder ``out``."""
-    performances = []
-    declared = scale_reading(person, visit.number, visit.tolerances)
-    for trial in plan.trials:
-        performance = performed(instruments, person, trial)
-        recording = record(performance, instruments)
-        for fault in visit.faults:
-            recording = fault(recording)
-        declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
-        write(recording, out)
-        performances.append(performance)
-    (out / "session.toml").write_text(session_toml(person, plan, declared, joints=visit.laboratory.joints))
-    (out / TRUTH).mkdir()
-    document = truth(person, plan.name, instruments, performances)
-    (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
 
 
 def check_simulated(subject: Subject) -> None:

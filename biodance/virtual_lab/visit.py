@@ -36,7 +36,6 @@ PLATES = (0.02, 0.15)
 """N per root Hz of Fz: unloaded plates of public recordings have 0.05 to 0.12."""
 _SPREAD = 0.4
 """Standard deviation of the natural logarithm of how many times the usual tolerances a laboratory has."""
-_MOMENTS = 0.3  # N·m: a laboratory's zeros of moments are drawn up to twice this
 _SEGMENTS = (12, 14, 16, 18, 20, 22)
 _ALONE = {14: ("head_motion", "thorax_motion", "thorax_share"), 16: ("wrist_motion", "clavicle_rhythm")}
 """What moves by itself from so many segments on; below, it is rigid."""
@@ -135,7 +134,7 @@ def draw_laboratory(seed: int) -> Laboratory:
         camera_rate=rate,
         samples=int(rng.choice([5, 10])),
         tolerances=_drawn_tolerances(rng, segments),
-        moment_zero=float(rng.uniform(0, 2) * _MOMENTS),
+        moment_zero=float(rng.uniform(0, 2) * 0.3),  # N·m
         segments=segments,
         tissue=str(rng.choice(list(TISSUES))),
         population=seed,

@@ -70,9 +70,7 @@ LIMIT = FootPlacement
 
 
 def _measured(body: Body, side: str, knee: float) -> tuple[int, float] | None:
-    """Return the segment that begins at the hip, and the hip-ankle distance m of the body with the knee bent by
-    ``knee`` rad; None where the axes of hip or ankle do not meet in a point.
-    """
+    """Return the thigh and the hip-ankle distance m with the ``knee`` bent; None where axes do not meet."""
     foot = body.feet[side].segment
     path = body.path_to(foot)
     spread = [body.joints[j].translation for j in (*path[1:3], *path[5:])]

@@ -254,9 +254,7 @@ def effort(state: State) -> tuple[float, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Scale:
-    """Angles (n,) rad of every joint: ``rest`` standing, ``half`` of the range, ``upward``, ``downward`` from standing
-    to the stops (at least 0.2); ``pairs`` of right and left joints.
-    """
+    """Angles (n,) rad: ``rest``, ``half`` of the range, ``upward`` and ``downward`` to the stops; ``pairs``."""
 
     rest: Array
     half: Array

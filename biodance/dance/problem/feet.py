@@ -15,7 +15,6 @@ from biodance.records import SIDES, Array
 
 AROUND = 0.025
 """m of plate around the soles: nobody stands exactly on the marks, and soles are known to about 1 cm."""
-_ROUNDING = 1e-9  # m
 
 
 def room_on_plates(stances: Iterable[Stance]) -> Array:
@@ -47,13 +46,6 @@ def plate_corners(stances: Iterable[Stance], plate: tuple[float, float]) -> Arra
     return (low + high) / 2 + half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
 
 
-def room_in_words(room: Array, *, seated: bool = False) -> str:
-    """Return in a phrase how much plate a dance needs (`room_on_plates`)."""
-    size = f"{room[0]:.2f} m of force plate from side to side and {room[1]:.2f} m ahead"
-    around = f"the feet need {size}, {100 * AROUND:g} cm around them included"
-    return f"the stool's legs need {size}" if seated else around
-
-
 def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
     """Return ``wide`` and ``forward`` of a plan, reduced where its plate asks for it: all feet fit on the plate.
 
@@ -72,9 +64,7 @@ def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
 
 
 def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, float, Array]:
-    """Return ``wide`` and ``forward`` as near to the plan's as a ``plate`` asks for and is legal, and the room (2,) m
-    that the feet then need.
-    """
+    """Return ``wide`` and ``forward`` as near to the plan's as a ``plate`` asks for, and the room (2,) m."""
     over = np.maximum(_room(body, plan, plan.wide, plan.forward) - plate, 0.0)
     wide, forward = plan.wide, plan.forward
     if over[0] > 0:
@@ -86,7 +76,7 @@ def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, 
 
 
 def _fits(room: Array, plate: tuple[float, float]) -> bool:
-    return bool(np.all(room <= np.array(plate) + _ROUNDING))
+    return bool(np.all(room <= np.array(plate) + 1e-9))
 
 
 def _room(body: Body, plan: Plan, wide: float, forward: float) -> Array:
@@ -100,10 +90,12 @@ def _too_small(plan: Plan, plate: tuple[float, float], least: Array, *, turned: 
     side, ahead = plate
     nearest = "" if plan.seated else ", as near together as is legal"
     remedy = f"Let the person face across it (--plate {ahead:g},{side:g})" if turned else "Use a larger plate"
+    size = f"{least[0]:.2f} m of force plate from side to side and {least[1]:.2f} m ahead"
+    around = f"the feet need {size}, {100 * AROUND:g} cm around them included"
+    needed = f"the stool's legs need {size}" if plan.seated else around
     return (
         f"Plan {plan.name}: on a plate of {side:g} m from side to side and {ahead:g} m ahead "
-        f"{room_in_words(least, seated=plan.seated)}{nearest}. {remedy}, or two plates side by "
-        f"side that touch, a foot on each."
+        f"{needed}{nearest}. {remedy}, or two plates side by side that touch, a foot on each."
     )
 
 

@@ -141,16 +141,12 @@ WEIGHT = 100.0
 _NEAR = 1.5  # Margins (in their scale) larger than this cannot become active within one step
 
 
-_RADIUS, _SETTLED = 0.3, 1e-3
-"""The first step's largest change of a variable; a gain that counts as none."""
-
-
 def minimise(problem: NonlinearProgramme, start: Array, *, iterations: int) -> tuple[Array, float]:
     """Return a local minimum y (n,) from ``start`` and its violation, the largest -c (negative: room left); f and c
     should be scaled so that 1 is a large amount.
     """
     y, n = start.copy(), start.size
-    point, hessian, radius = problem.evaluate(y), np.eye(n), _RADIUS
+    point, hessian, radius = problem.evaluate(y), np.eye(n), 0.3
     for _ in range(iterations):
         step, price = quadratic_step(hessian, point.gradient, point.near_slopes, point.margins[point.near], radius)
         # Fall of the merit function that the linear model promises.
@@ -170,7 +166,7 @@ def minimise(problem: NonlinearProgramme, start: Array, *, iterations: int) -> t
         bend = trial.gradient - point.gradient - price @ (trial.jacobian(point.near) - point.near_slopes)
         hessian = update(hessian, step, bend)
         y, point = y + step, trial
-        if gained < _SETTLED and worst(point.margins) < 1e-4:
+        if gained < 1e-3 and worst(point.margins) < 1e-4:
             break
     return y, float(-point.margins.min(initial=np.inf))
 

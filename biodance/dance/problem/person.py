@@ -34,7 +34,6 @@ _RESTING = {
     "hip_rotation": (math.radians(5.0), "Whoever stands or sits upright turns the hips a little"),
 }
 """rad to both sides of straight that nobody can do without, and why."""
-_FITS = math.radians(3.0)  # rad less at which the seat is soft enough
 _LEAST_RANGE = math.radians(6.0)  # rad: nobody holds a joint within less
 _LIMBS = {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee", "ankle")}
 """What an arm and a leg are made of."""
@@ -150,9 +149,7 @@ def _allowed(stance: str, person: PersonLimits) -> bool:
 
 
 def _own_limits(body: Body, own: Body, person: PersonLimits) -> list[Limit]:
-    """Return the limits of this person that are no joint's: how far arms are lifted (where ``own`` body reaches less
-    than any ``body``, whatever the joint angle by which), and what a foot bears.
-    """
+    """Return this person's limits that are no joint's: how far arms are lifted, and what a foot bears."""
     lifts = dict[str, float]()
     for side in SIDES:
         names = [joint.name for joint in body.joints]
@@ -174,9 +171,7 @@ def _own_limits(body: Body, own: Body, person: PersonLimits) -> list[Limit]:
 
 
 def _possible(body: Body, limits: JointLimits, plan: Plan, person: PersonLimits) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits with what nobody can do without, and what of ``person`` was therefore not applied, in
-    sentences: a shoulder comes back to the hanging arm, every joint moves a little, hip and knee bend to sit.
-    """
+    """Return the limits with what nobody can do without, and sentences on what was therefore not applied."""
     lower, upper, own, notes = limits.lower.copy(), limits.upper.copy(), body.limits, list[str]()
     for j, joint in enumerate(body.joints):
         before, bare, why = (lower[j], upper[j]), joint.name.partition("_")[2], ""
@@ -184,7 +179,7 @@ def _possible(body: Body, limits: JointLimits, plan: Plan, person: PersonLimits)
         if bare in _RESTING and not (lower[j] <= -_RESTING[bare][0] and _RESTING[bare][0] <= upper[j]):
             around, why = _RESTING[bare]
             lower[j], upper[j] = min(lower[j], 0.0 - around), max(upper[j], around)
-        if upper[j] < sitting - _FITS:
+        if upper[j] < sitting - math.radians(3.0):  # the seat is soft enough
             upper[j], why = sitting, "Whoever sits bends hips and knees"
         if upper[j] - lower[j] < min(_LEAST_RANGE, own.upper[j] - own.lower[j]):
             middle = np.clip(
@@ -264,11 +259,8 @@ _KEYS = (*_WORDS, "max_speed_deg_s", "seat_height_m", "rest_after_s", *_TABLES)
 _OVERHEAD = "lift arms over shoulder height"
 _CANNOT = ("stand", *(f"stand on {side} leg" for side in SIDES), "turn", _OVERHEAD)
 GRADES = {"grade 5": 1.0, "grade 4": 0.6, "grade 3": 0.25}
-"""Share of the usual strength by the grade of a manual muscle test: 4 holds against some resistance, 3 against none but
-gravity.
-"""
+"""Share of the usual strength by the grade of a manual muscle test (3 holds against nothing but gravity)."""
 _RIGHT_ANGLE = math.pi / 2
-_SEAT = (0.3, 1.2)  # m that a seat may be high
 _Ranges = list[tuple[str, float, float]]
 
 PLAIN_MOVEMENTS = {
@@ -387,7 +379,7 @@ def limits_in(raw: dict[str, Any], path: Path) -> PersonLimits:
         tuple(_listed(path, raw, "hold_frame", "hand", SIDES)),
         bearing,
         _OVERHEAD in cannot,
-        _positive(path, raw, "seat_height_m", 0.0, legal=_SEAT),
+        _positive(path, raw, "seat_height_m", 0.0, legal=(0.3, 1.2)),  # m
         sentences(path, raw),
         _positive(path, raw, "rest_after_s", math.inf, legal=(LEAST_REST, math.inf)),
     )

@@ -95,12 +95,8 @@ _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated"
 """Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
 LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
 """Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
-USUAL_PLATE = (0.40, 0.60)
-"""m from side to side and ahead: the commonest force plate (AMTI BP400600, Kistler 9281), long side ahead."""
 LEAST_REST = 10.0
 """s of dancing, at least, before a rest."""
-_PLATE = (0.2, 3.0)  # m that a side of a plate, or of several that touch, may have
-_BRIEF = 1.0  # s that postures in between are held at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +175,7 @@ class Plan:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
-        low, high = _PLATE
+        low, high = 0.2, 3.0  # m
         if self.plate is not None and not all(low <= side <= high for side in self.plate):
             raise BiodanceError(
                 f"Plan {self.name}: plate = {' by '.join(f'{side:g}' for side in self.plate)} m; legal are {low:g} to "
@@ -210,7 +206,7 @@ class Plan:
 
     def hold_on(self, stance: Stance) -> float:
         """Return for how long a posture is held on these feet, s: postures in between only shortly."""
-        return self.hold if stance.over is None else min(_BRIEF, self.hold)
+        return self.hold if stance.over is None else min(1.0, self.hold)  # s, in between
 
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
         """Return the plan with ``more`` limits, objects or classes; one of a name that is there takes its place."""
@@ -269,7 +265,8 @@ def read_plan(name_or_path: str | Path) -> Plan:
     free = flags.pop("free", False)
     fields: dict[str, Any] = (
         ({} if free else dict(_FOLLOWABLE))
-        | {"plate": _plate(path, raw["plate_m"]) if "plate_m" in raw else USUAL_PLATE}
+        # m: AMTI BP400600, Kistler 9281
+        | {"plate": _plate(path, raw["plate_m"]) if "plate_m" in raw else (0.40, 0.60)}
         | flags
         | words
         | {"care": sentences(path, raw)}

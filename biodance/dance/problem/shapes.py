@@ -112,7 +112,6 @@ def palm(body: Body, side: str) -> tuple[int, Array]:
 
 _NEAR = 2
 """Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
-_POINTS = 41  # On a limb's axis, at which it is held against others at zero angles
 _LEAST = 0.01  # Half length of a capsule in a cube, in its radius: a line of no length has no direction
 
 
@@ -134,7 +133,7 @@ def tree_pairs(body: Body) -> Pairs:
     solid, walls = _distant_pairs(body)
     pose = poses(body, body.neutral[None])
     shape = {i: capsule(body, i) for i in range(len(body.segments))}
-    axes = {i: points_on_axis(pose, i, ends, _POINTS) for i, (ends, _) in shape.items()}
+    axes = {i: points_on_axis(pose, i, ends, 41) for i, (ends, _) in shape.items()}
     free = [(i, j) for i, j in solid if points_apart(axes[i], axes[j])[0] - shape[i][1] - shape[j][1] > 0]
     clear = [(i, j) for i, j in walls if points_off_box(body, pose, axes[i], j)[0] - shape[i][1] > 0]
     left = [pair for pair in solid + walls if pair not in free and pair not in clear]
@@ -142,15 +141,15 @@ def tree_pairs(body: Body) -> Pairs:
 
 
 def _distant_pairs(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Return the pairs of two limbs, and of a limb and a box, that are no neighbours along the tree. A box is the root
-    or carries several segments; all others are limbs.
-    """
+    """Return the pairs of two limbs, and of a limb and a box (root, or carrier of several), that are no neighbours."""
     carried = body.segment_joint[: len(body.segments)]
     above = [body.place_on_segment(joint)[0] if joint >= 0 else -1 for joint in carried]
     boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
     limbs = [i for i in range(len(above)) if i not in boxes]
     legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
-    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
+    # segments apart along the tree: what both ways to the root share drops out
+    ways = {i: set(_up(above, i)) for i in limbs}
+    solid = [(i, j) for i, j in combinations(limbs, 2) if len(ways[i] ^ ways[j]) > _NEAR]
     return solid, [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
 
 
@@ -159,13 +158,6 @@ def _up(above: list[int], segment: int) -> list[int]:
     while above[path[-1]] >= 0:
         path.append(above[path[-1]])
     return path
-
-
-def _apart(above: list[int], i: int, j: int) -> int:
-    """Return how many segments apart two segments are along the tree."""
-    one, two = _up(above, i), _up(above, j)
-    # What both ways to the root share drops out.
-    return len(set(one) ^ set(two))
 
 
 def points_on_axis(pose: Poses, segment: int, ends: Array, count: int) -> Array:

@@ -23,10 +23,6 @@ imprecise people came as near as 1 mm to the edge of the foot as they lifted the
 """
 _FORWARD = 0.2  # m: how far the right foot stands in front (paper III.D, human subject)
 SINGLE = {"single_right": (0,), "single_left": (1,)}
-STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
-"""(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
-HANGING = 0.08
-"""m between the ground and the soles of hanging legs on a stool."""
 SEAT_TO_HIP = 0.08
 """m from a seat up to the hip centres of who sits on it: half a thigh."""
 _GRIP = (0.24, 0.30, 0.53)
@@ -183,8 +179,10 @@ def seat(body: Body, *, share: float = 1.0, height: float = 0.0) -> Stance:
     """
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in SIDES]
-    hips = height + SEAT_TO_HIP if height else float(max(legs) + feet.ankle[:, 2].max()) + HANGING
-    return replace(feet, props=STOOL, seat=hips)
+    # m under the soles
+    hips = height + SEAT_TO_HIP if height else float(max(legs) + feet.ankle[:, 2].max()) + 0.08
+    # the legs of a stool of 0.4 m by 0.4 m, from below the hips
+    return replace(feet, props=np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]]), seat=hips)
 
 
 def apart(body: Body, share: float, *, wide: float = 1.0) -> float:

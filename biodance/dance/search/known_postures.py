@@ -37,7 +37,6 @@ _FREE = {
     "elbow_flexion": (10, 45, 75, 105),
 }
 """degrees: what free postures of an arm are drawn from; away from trunk and thighs."""
-_FREE_WORDS = 8
 _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
     ("lifted", "hanging"), ("hip", "knee", "ankle")
 )
@@ -205,7 +204,7 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     """Return free postures of an arm, on a grid of angles that can be called."""
     grid = list(product(*_FREE.values()))
-    chosen = sorted(int(k) for k in rng.choice(len(grid), _FREE_WORDS, replace=False))
+    chosen = sorted(int(k) for k in rng.choice(len(grid), 8, replace=False))
     out = []
     for number, k in enumerate(chosen, start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
@@ -221,9 +220,7 @@ def own_joint(part: str, joint: str) -> str:
 
 
 def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
-    """Return the word within the ranges of this body and the limits of the plan, None where that would leave too little
-    of it; of a word that is cut short the name says so.
-    """
+    """Return the word as this body and the plan's limits ask; None where too little of it is left."""
     if part == "legs":
         return word
     if _short_of(body, plan, part, word):
@@ -283,10 +280,6 @@ def singular(text: str) -> str:
 
 _ROUNDS = 5  # Corrections of the pelvis; each leaves about a fifth of the error
 _BACK = 0.03  # m behind the middle of the support where people stand: over the arch of the foot
-_GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
-"""Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
-_ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
-"""rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
 _FROM_STOP = float(np.radians(3.0))  # rad that the joints of a holding arm keep from their stops
 _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
@@ -377,7 +370,8 @@ def _pair_words(pair: list[Word]) -> list[str]:
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:
     """Return the coordinates (S, n) of the postures with the words ``index`` (S, parts)."""
-    x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
+    x, knee = np.zeros((len(index), chain.size)), np.zeros(len(index))
+    names = {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
             # Rows of postures with this word of this part.
@@ -391,35 +385,30 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
                     knee[rows] = angle
                 elif (name := own_joint(part, joint)) in names:
                     x[rows, names[name]] = angle
-    for _ in range(_GRIPPED if stance.holding else 0):
+    for _ in range(2 if stance.holding else 0):
         x = _gripping(chain, stance, settled(chain, stance, x, knee))
     return settled(chain, stance, x, knee)
 
 
 def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
-    """Return coordinates ``x`` (S, n) with the holding arms bent so that the palms come to their grips, or as near as
-    their joints reach: by least squares, step by step.
-    """
+    """Return ``x`` (S, n) with holding arms bent by least squares, so that the palms come to their grips."""
     x, limits = x.copy(), chain.body.limits
     for side in stance.holding:
         segment, local = palm(chain.body, SIDES[side])
         arm = chain.arm_columns[side]
         low, high = limits.lower[np.array(arm) - ROOT] + _FROM_STOP, limits.upper[np.array(arm) - ROOT] - _FROM_STOP
-        for _ in range(_STEPS):
+        for _ in range(12):
             place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
             # Away from the present angles towards the elbow's.
-            J, out = slope[:, 0][:, :, arm], np.array(_ELBOW_OUT) - x[:, arm]
+            # of shoulder flexion, adduction, rotation, elbow flexion: away from the trunk
+            J, out = slope[:, 0][:, :, arm], np.array(tuple(np.radians([0.0, -60.0, 40.0, 60.0]))) - x[:, arm]
             # Damped pseudoinverse J'(J J' + d 1)^-1.
-            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(3))
+            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + 1e-3 * np.eye(3))
             # out + J^+ (e - J out) = J^+ e + (1 - J^+ J) out: `out` acts in the null space of the palm's place.
             left = stance.hands[side] - place[:, 0] - np.einsum("sij,sj->si", J, out)
             step = np.einsum("sij,sj->si", inverse, left) + out
             x[:, arm] = np.clip(x[:, arm] + step, np.minimum(low, high), np.maximum(low, high))
     return x
-
-
-def _columns(chain: Chain) -> dict[str, int]:
-    return {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
 
 
 def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
@@ -471,9 +460,7 @@ def words_never_kept(table: PostureTable, limits: tuple[Limit, ...]) -> tuple[st
 
 
 def _short(table: PostureTable, limits: tuple[Limit, ...]) -> Array:
-    """Return what every posture of a table lacks of each of the limits at rest, (limits, S) in their scale, at most 0
-    where it is kept.
-    """
+    """Return what every posture lacks of each limit at rest, (limits, S) in their scale, at most 0 where it is kept."""
     rest = np.zeros_like(table.x)
     state, rows = State(table.chain, table.stance, table.x, rest, rest, sloped=False), list[Array]()
     for limit in (limit for limit in limits if limit.at_rest):

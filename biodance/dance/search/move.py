@@ -10,16 +10,9 @@ import numpy as np
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
 from biodance.dance.performers import deviations_of_copies
+from biodance.dance.problem import nlp
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
-from biodance.dance.problem.nlp import (
-    Evaluation,
-    NonlinearProgramme,
-    Objective,
-    free_coordinates,
-    minimise,
-    no_objective,
-)
 from biodance.dance.problem.splines import basis_at, straight_via
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -38,27 +31,12 @@ RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
-_ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
-"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
-of the rounds.
-"""
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
-_LITTLE = 0.01  # s·(rad/s²)², information on every inertia that is supposed before the first move
-HOPELESS = 0.5
-"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
-without the reserve on the coarse grid.
-"""
 
 
 SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
-DETOURS = 2
-"""Postures in between that are tried."""
-_SPARE = 0.5
-"""Fraction of what a limit's check forgives (`Limit.rounding`) that a move may use: the check of the whole dance
-samples other instants of it.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +68,8 @@ class Task:
         return straight_via(*self.ends)
 
     def problem(
-        self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective
-    ) -> NonlinearProgramme:
+        self, via: Array, free: list[int], time: Array, *, reserve: float, objective: nlp.Objective
+    ) -> nlp.NonlinearProgramme:
         """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
         ``via`` (2, n).
         """
@@ -108,7 +86,7 @@ class Task:
         bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
         share = np.array(least) * bell
         # Columns 1 and 2 of the basis belong to the via points.
-        return NonlinearProgramme(
+        return nlp.NonlinearProgramme(
             self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share
         )
 
@@ -175,7 +153,7 @@ class MoveObjective:
         grams = (
             self.history
             + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID
-            + _LITTLE * np.eye(6)
+            + 0.01 * np.eye(6)  # s·(rad/s²)², supposed before the first move
         )
         chosen = np.zeros(len(weight))
         # Weights add up to `share`.
@@ -193,7 +171,8 @@ def _logarithm(gram: Array) -> tuple[Array, Array]:
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     """Return the best feasible move after ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
-    for spread, share, rounds in _ATTEMPTS:
+    # spread (rad) about the straight move, share of excitation in the objective, iterations
+    for spread, share, rounds in ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12))):
         via = task.straight()
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
         for found, beyond in improving_moves(task, via, MoveObjective(task, history, share), rounds):
@@ -201,7 +180,7 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
                 best = found
             if best.violation == 0:
                 return best
-            if beyond > 0 or found.violation > HOPELESS:
+            if beyond > 0 or found.violation > 0.5:  # scales of violation
                 break
     assert best is not None
     return best
@@ -214,12 +193,12 @@ def improving_moves(
     violates the limits on the grid without their reserve; only the coordinates ``free`` move, by default all that can.
     After a round the worst instants are added and the reserve grows by a quarter.
     """
-    free = free_coordinates(task.chain, task.stance) if free is None else free
+    free = nlp.free_coordinates(task.chain, task.stance) if free is None else free
     via, time = via.copy(), task.grid(GRID)
     for k, iterations in enumerate(rounds):
         reserve = RESERVE * (1 + k / 4)
         problem = task.problem(via, free, time, reserve=reserve, objective=objective)
-        y, violation = minimise(problem, via[:, free].ravel(), iterations=iterations)
+        y, violation = nlp.minimise(problem, via[:, free].ravel(), iterations=iterations)
         via[:, free] = y.reshape(2, -1)
         found, instants = evaluate_move(task, via.copy())
         # The violation is that of the margins less the reserve: without it, less by as much.
@@ -231,8 +210,8 @@ def improving_moves(
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     """Return the move through ``via`` as all limits judge it on the fine grid, and the worst instants s."""
     time = task.grid(CHECK)
-    problem = task.problem(via, [], time, reserve=BETWEEN, objective=no_objective)
-    found = Evaluation(problem, problem.state(np.empty(0)).judged)
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=nlp.no_objective)
+    found = nlp.Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
     # Infinite beside the ends: a dip may lie there.
     left = np.pad(found.least, 1, constant_values=np.inf)
@@ -253,7 +232,7 @@ def exciting_move(task: Task, history: Array, seed: list[int]) -> Move:
         broken = direct.limit or _broken_limit(task, direct)
         if not broken:
             return direct
-    for attempt in range(DETOURS):
+    for attempt in range(2):  # postures in between that are tried
         try:
             stop = intermediate_posture(task.chain, task.stance, task.ends, task.limits, seed=[*seed, attempt]).x
         except BiodanceError:
@@ -268,7 +247,8 @@ def _broken_limit(task: Task, move: Move) -> str:
     """Return the limit that a move breaks by the independent check, "" if it breaks none."""
     count = len(move.via) + 1
     margins = verify(task.chain.body, move.dance(task, (task.stance,) * count, np.zeros(count)), task.limits)
-    spare = {limit.name: _SPARE * limit.rounding for limit in task.limits}
+    # the check of the whole dance samples other instants of the move
+    spare = {limit.name: 0.5 * limit.rounding for limit in task.limits}
     return next((one.limit for one in margins if not one.worst >= spare.get(one.limit, 0.0)), "")
 
 
@@ -290,7 +270,6 @@ def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move |
 _SLOWER = (1.0, 1.4, 1.8)  # Factors on the duration of a straight move, one after the other
 ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
-_ITERATIONS = (12, 8)
 _FROM_STOP = 0.08  # rad that a lifted leg keeps from the stops of its joints
 _LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
 """rad by which hip, knee and ankle of a lifted leg bend on the way, and by which it goes away from the other one."""
@@ -342,10 +321,7 @@ def _vias(task: Task) -> list[Array]:
 
 
 def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
-    """Return the first move that keeps all limits and leaves imprecise people `AMPLE` deviations, or else the one that
-    leaves them most, with the limit of which it is less than ``enough``, and how many; if none keeps all limits, the
-    one that violates least.
-    """
+    """Return the first move with `AMPLE` deviations, else that with most, its limit below ``enough``, and how many."""
     tried, best, most = list[Move](), None, -np.inf
     for move in moves:
         tried.append(move)
@@ -363,7 +339,7 @@ def _round_about(task: Task, best: Move) -> Move:
     """Return a move in which the pelvis and a lifted leg avoid what the straight one breaks."""
     up = [c for side in (0, 1) if side not in task.stance.planted for c in task.chain.leg_columns[side]]
     objective = MoveObjective(task, np.zeros((len(task.chain.body.segments), 6, 6)), 0.0)
-    for found, _ in improving_moves(task, best.via[0], objective, _ITERATIONS, free=[*range(ROOT), *up]):
+    for found, _ in improving_moves(task, best.via[0], objective, (12, 8), free=[*range(ROOT), *up]):
         best = min(best, found, key=lambda move: move.violation)
         if best.violation == 0:
             break

@@ -23,15 +23,10 @@ from biodance.dance.search.known_postures import PostureTable
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_METRE = 3.0  # rad that a metre of the root counts
 _ENDS = (1, 0, 1)
 """Which end of a move that cannot be made is exchanged: where it goes to, comes from, the new one where it goes to."""
 _REST = (0.0, 0.6, 0.15)
 """Share of their neighbours' joint angles that postures in between keep in these attempts."""
-_STARTS, _SHARPNESS, _ITERATIONS = 6, 8, 20
-"""Of the search for another posture: starts, sharpness of the condition number, iterations."""
-_FEWER = 4
-"""Postures that may be left out, one after the other, as long as half of those on the same feet are left."""
 
 
 def optimised_course(work: DesignContext) -> Course:
@@ -68,9 +63,7 @@ def _postures(work: DesignContext) -> Course:
 
 
 def _with_stops(work: DesignContext, stances: tuple[Stance, ...], x: Array) -> Course:
-    """Return the course of the postures ``x`` on those of the ``stances`` that count, and of found ones on the others,
-    on which the weight is over one foot of two.
-    """
+    """Return the course of postures ``x`` on the ``stances`` that count, and of found ones on the others."""
     counted = [k for k, stance in enumerate(stances) if stance.over is None]
     rows = dict(zip(counted, x, strict=True))
     for k in (k for k, stance in enumerate(stances) if stance.over is not None):
@@ -114,7 +107,7 @@ def nearest_neighbours(x: Array, groups: list[list[int]]) -> list[int]:
     """Return the rows of ``x`` (P, n) in an order in which neighbours are near; groups stay together, in turn."""
     scaled = x.copy()
     # Metres and radians in one distance.
-    scaled[:, :3] *= _METRE
+    scaled[:, :3] *= 3.0  # rad that a metre of the root counts
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
     out: list[int] = []
     for group in groups:
@@ -163,7 +156,7 @@ def feasible_course(work: DesignContext, course: Course) -> Course:
         A move cannot be made whatever postures it joins; the message names it and the limit it breaks.
     """
     first, course = course, with_exciting_moves(work, course)
-    for attempt in range(1, len(_ENDS) + _FEWER + 1):
+    for attempt in range(1, len(_ENDS) + 4 + 1):  # then up to four postures are left out
         limits = {k: move.limit for k, move in enumerate(course.moves) if move is not None and move.limit}
         if not limits:
             break
@@ -207,10 +200,10 @@ def _other_posture(work: DesignContext, course: Course, place: int, rng: np.rand
     counted = [step for k, step in enumerate(course.steps) if step.stance.over is None and k != place]
     others = [postures.posture_at(chain, step.stance, step.x) for step in counted]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
-    objective = postures.Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), _SHARPNESS)
-    starts = [postures.initial_guess(chain, stance, rng) for _ in range(_STARTS)]
+    objective = postures.Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), 8)
+    starts = [postures.initial_guess(chain, stance, rng) for _ in range(6)]
     given = objective, work.plan.limits
-    tasks = [work.workers.submit(postures.solve, chain, stance, one, *given, iterations=_ITERATIONS) for one in starts]
+    tasks = [work.workers.submit(postures.solve, chain, stance, one, *given, iterations=20) for one in starts]
     found = [task.result() for task in tasks]
     same = [step.x for k, step in enumerate(course.steps) if step.stance.name == stance.name and k != place]
     kept = [
@@ -220,9 +213,7 @@ def _other_posture(work: DesignContext, course: Course, place: int, rng: np.rand
 
 
 def _spare(course: Course, k: int, first: Course) -> set[int]:
-    """Return the end of move ``k`` that can be left out: a posture that counts, of a kind of which half is left of the
-    ``first`` course; none if there is no such end.
-    """
+    """Return the end of move ``k`` that can be left out, of a kind of which half is left; none without such an end."""
     now, before = ([stance.name for stance in one.stances if stance.over is None] for one in (course, first))
     for place in (k + 1, k):
         stance = course.stances[place]

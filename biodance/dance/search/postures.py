@@ -81,7 +81,6 @@ def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Arr
     return x
 
 
-_ITERATIONS = 30
 MILD = 0.3
 """Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""
 
@@ -112,7 +111,7 @@ def intermediate_posture(
     begin = initial_guess(chain, stance, rng)
     begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
-        found = solve(chain, stance, begin, distance_from(begin), limits, iterations=_ITERATIONS)
+        found = solve(chain, stance, begin, distance_from(begin), limits, iterations=30)
         if found.violation <= KEPT:
             return found
         tried.append(begin)
@@ -230,7 +229,6 @@ FLIP = np.array([1.0, 1.0, -1.0])
 """Sense of the axes of a segment in the image (z to the right)."""
 SIDEWAYS = ("_bending", "_rotation")
 """Ends of the names of middle joints that change their sense; paired ones have the anatomical sense on both sides."""
-_SAME = 1e-9  # m, kg, rad, N·m: differences between the sides that are rounding
 
 
 def counterpart(name: str) -> str:
@@ -263,7 +261,7 @@ def symmetric(body: Body) -> bool:
         (FLIP * body.sip.com[other], body.sip.com),
         (np.sort(FLIP * body.boxes[other], axis=1), body.boxes),
     ]
-    return all(np.allclose(image, own, rtol=0.0, atol=_SAME) for image, own in pairs)
+    return all(np.allclose(image, own, rtol=0.0, atol=1e-9) for image, own in pairs)
 
 
 def _joints(names: list[str]) -> tuple[list[int], Array]:
@@ -429,9 +427,7 @@ class _Search:
 
 @dataclass(frozen=True, eq=False)
 class _SameFeet:
-    """All ``postures`` (K) on the same feet, their Gram matrices ``grams`` (K, N, 3, 3), which are ``like`` which
-    (K, K), how ``hard`` (K,) they are to take, kg; ``taken`` indices of those chosen, by place.
-    """
+    """``postures`` (K) on the same feet, ``grams``, which are ``like`` which, how ``hard`` (kg), those ``taken``."""
 
     postures: list[Posture]
     grams: Array

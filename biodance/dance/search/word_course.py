@@ -37,8 +37,6 @@ from biodance.dance.search.move import AMPLE, ENOUGH, Move, Task, straight_move
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_PARTS = 2  # Parts of the body that change at a time
-
 
 def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
@@ -47,7 +45,7 @@ def _near(last: DanceStep | None, table: PostureTable) -> list[int]:
     for column, part in enumerate(table.parts):
         keys = np.array([word.key for word in table.words[part]])[table.index[:, column]]
         off += keys != was.get(part, table.words[part][0].key)
-    near = np.flatnonzero(off <= _PARTS).tolist()
+    near = np.flatnonzero(off <= 2).tolist()  # parts of the body that change at a time
     if last is not None and last.table is table and table.mirrored[last.s] >= 0:
         near = sorted({*near, int(table.mirrored[last.s])})
     return near
@@ -101,18 +99,12 @@ class NoNextPosture(BiodanceError):
 
 _INSTRUCTION = 0.5  # s that one instruction is worth at simplicity 1
 _TRIES = 200  # Postures that are taken or given up before a search is
-_NEXT_TRIED = 5  # Postures that are tried after another one before that one is given up
-_AT_ONCE = 12
-"""Postures of which one that imprecise people surely can is taken before others that tell more."""
 _LIFTING = 1.4  # Times as long as others that a move takes in which a foot is lifted or put down
-_LOOKED_AT = 24  # Postures that tell most standing still, whose moves are judged, too
 
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the search: the ``step`` and ``move`` that were taken to it, the ``posterior`` there, and what is
-    ``left`` to try after it, None before the first look.
-    """
+    """The ``step`` and ``move`` taken to a place, the ``posterior`` there, and what is ``left`` to try after it."""
 
     posterior: Array
     step: DanceStep | None = None
@@ -159,7 +151,7 @@ class WordSearch:
             here = path[-1]
             if here.left is None:
                 broken = why.setdefault(number, {})
-                here.left = islice(self.possible(steps, stances, here.posterior, broken), _NEXT_TRIED)
+                here.left = islice(self.possible(steps, stances, here.posterior, broken), 5)
             found = next(here.left, None)
             if found is not None:
                 path.append(_Place(self.posterior_after(here.posterior, steps, found[0]), *found))
@@ -207,7 +199,8 @@ class WordSearch:
         first that imprecise people surely can; ``why`` counts the limits that others break.
         """
         last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, posterior))
-        while some := list(islice(ranked, _AT_ONCE)):
+        # of these one that imprecise people surely can is taken before others that tell more
+        while some := list(islice(ranked, 12)):
             doubtful = list[tuple[float, DanceStep, Move | None]]()
             for step in some:
                 room, broken, move = *self._kept(step), None
@@ -248,7 +241,7 @@ class WordSearch:
         # Variance removed per second.
         gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
-        first = list(islice(on, _LOOKED_AT))
+        first = list(islice(on, 24))  # those that tell most standing still
         gains = np.array([float(self.information.gains(posterior, self._rows(last, step))) for step in first])
         yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on

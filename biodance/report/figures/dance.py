@@ -33,14 +33,13 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = 10
-VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
-"""(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
 
 
 def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
     """Draw postures ``q`` (P, nq) in rows of ten, titled, to one scale; right is blue, left red and dashed."""
     lines, sides = bone_lines(body, poses(body, q))
-    flat = lines @ VIEW.T
+    # oblique, from the front and right: lab x, y, z to the page's right and up
+    flat = lines @ np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]]).T
     # each posture about its own middle, heights as they are
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
@@ -133,12 +132,10 @@ _RATE = 25.0  # Pictures per second
 _SIZE, _FLOOR = (290, 480), 450  # Of one view, px; row of the floor
 _MARGIN = 8.0  # px beside the widest posture
 _SCALE = 170.0  # px per metre of a person's height
-_TALL = 1.75  # m: bodies are drawn as large as if they were so tall
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Title and horizontal direction of the eye."""
 _FINE = 2  # Times as fine a picture is drawn before it is made smaller, so that edges are smooth
 _INK = {"right": (0, 114, 178), "left": (213, 94, 0), "middle": (110, 120, 130)}
-_PALE = 0.55  # Share of white in the colours of the plan
 _FORMATS = (".gif", ".mp4")
 
 
@@ -169,7 +166,7 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     # the tallest posture fits into the picture, and the widest: arms overhead, a leg lifted to the side
     planned = [outline for parts in seen[: len(_VIEWS)] for _, outline, _ in parts]
     wide, tall = np.max([np.abs(outline).max(axis=(0, 1)) for outline in planned], axis=0)
-    scale = min(_SCALE * _TALL / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
+    scale = min(_SCALE * 1.75 / max(tall, 0.2), (_SIZE[0] / 2 - _MARGIN) / wide)
     pictures = _pictures(seen, played.wrench.cop()[rows], played.time[rows], scale)
     with whole_file(out, over=True) as part:
         _write(pictures, part, out)
@@ -199,9 +196,7 @@ def _write(pictures: "Iterator[Image]", part: Path, out: Path) -> None:
 
 
 def _pictures(seen: list[list[tuple[str, Array, Array]]], cop: Array, time: Array, scale: float) -> "Iterator[Image]":
-    """Yield the instants of ``time`` s: what is ``seen`` (`silhouettes`) by both eyes of the plan, pale, then of what
-    was played, with its pressure (T, 3) m in red; ``scale`` px per m.
-    """
+    """Yield each instant: what is ``seen`` of the plan, pale, then as played; ``scale`` px per m."""
     from PIL import Image, ImageDraw
 
     width, height, floor = _SIZE[0] * _FINE, _SIZE[1] * _FINE, _FINE * _FLOOR
@@ -223,7 +218,7 @@ def _pictures(seen: list[list[tuple[str, Array, Array]]], cop: Array, time: Arra
         image = empty.copy()
         draw = ImageDraw.Draw(image)
         for (title, _, eye), middle, parts in zip(titles, middles, placed, strict=True):
-            pale = _PALE if title == "planned" else 0.0
+            pale = 0.55 if title == "planned" else 0.0  # share of white
             for segment, outline, _ in sorted(parts, key=lambda one: float(one[2][t])):
                 red, green, blue = (round(one + pale * (255 - one)) for one in _INK[side_in_name(segment)])
                 draw.polygon(outline[t].ravel().tolist(), fill=(red, green, blue), outline="white")

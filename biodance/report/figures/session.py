@@ -24,9 +24,6 @@ from biodance.report.figures import vector as svg
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.wording import format_number, millimetres
 
-_LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
-"""N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
-
 
 def bar_list(rows: Sequence[tuple[str, float, float, str]], about: str) -> str:
     """Return bars as a list in columns: name, length of the bar and place of the tick in %, and the number as text."""
@@ -123,7 +120,8 @@ def _channels(
     """Return for each channel its curves, measured first, over measured minus curve; forces left, moments right."""
     cells = []
     for channel in (0, 3, 1, 4, 2, 5):
-        title, least = CHANNEL_TITLES[channel], _LEAST[channel]
+        # the noise of quiet standing is not blown up
+        title, least = CHANNEL_TITLES[channel], (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)[channel]
         truth, left = measured[:, channel], []
         drawn = [svg.Curve("measured", truth, svg.MEASURED)]
         for name, value, look in curves:
@@ -159,8 +157,6 @@ def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None 
 
 VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 """Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""
-
-_MM = 1000.0
 
 
 def _outline(points: Array, kind: str) -> str:
@@ -227,7 +223,7 @@ def still_figure(still: Still) -> str:
         e, a = np.radians(elevation), np.radians(azimuth) + np.arctan2(still.forward[1], still.forward[0])
         down = [np.sin(e) * np.cos(a), np.sin(e) * np.sin(a), -np.cos(e)]
         eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
-        screen = _MM * np.array([[-np.sin(a), np.cos(a), 0.0], down, eye]).T
+        screen = 1000.0 * np.array([[-np.sin(a), np.cos(a), 0.0], down, eye]).T
         parts = [
             _line((corners[[0, 1, 2, 3, 0]] @ screen)[:, :2], f'stroke="{GREY}" stroke-width="6"')
             for corners in still.plates

@@ -230,7 +230,6 @@ def panel(x: Axis, y: Axis, marks: Iterable[str], about: str, *, frame: Frame = 
 
 _MUCH = 0.7  # Share of used frames below which a figure begins with these
 _NARROW, _TALL = 46.0, 110.0  # px of the height of a difference and of a curve
-_THREE = 300.0  # px of width below which three panels stand beside each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,7 +311,7 @@ class CurveFigure:
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
             f'<div class="legend">{self._legend(bool(left_out), bool(filled))}</div><p class="reading"></p>'
-            f'<div class="cells{" three" * (self.width < _THREE)}">{cells}</div></div>'
+            f'<div class="cells{" three" * (self.width < 300.0)}">{cells}</div></div>'  # px
         )
 
     def _cell(self, x: Axis, strips: Sequence[Strip], shades: list[str]) -> str:

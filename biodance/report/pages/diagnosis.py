@@ -97,14 +97,11 @@ def estimated(one: Estimate) -> str:
     return f"{value} (95 % interval {low} to {high})"
 
 
-_CERTAIN = 14.0  # Natural logarithm of a million: above it odds are no longer printed
-
-
 def odds(log_bayes_factor: float) -> str:
     """Return evidence against "nothing wrong" as odds in words."""
     if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
         return "a check of the recording shows it"
-    if log_bayes_factor > _CERTAIN:
+    if log_bayes_factor > 14.0:  # odds of more than a million are not printed
         return "more than a million times as probable as nothing wrong"
     return f"{wording.format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 

@@ -130,12 +130,9 @@ def excitation_figure(found: "PerformanceScore") -> str:
     return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
 
 
-_RANKED = 15  # Quantities that the figure of pulls and impacts shows
-
-
 def impact_figure(found: Sequence[Impact]) -> str:
     """Return the largest impacts: pull from the prior with what is left of it, and moments of knee and hip."""
-    rows = list(found[:_RANKED])
+    rows = list(found[:15])
     ticks = tuple((len(rows) - 1.0 - i, spaced(f"{row.segment} {row.quantity}")) for i, row in enumerate(rows))
     y = svg.Axis(-0.6, len(rows) - 0.4, "", ticks)
     far = max(2.0, *(abs(row.pull) + row.left for row in rows))
@@ -194,15 +191,6 @@ def torque_figure(bands: TorqueBands) -> str:
     return drawn.html()
 
 
-MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
-LISTED = "Cannot be known"
-"""Start of the note whose content the page shows as a table."""
-_SCHEMAS = {
-    "segment": tables.SEGMENT_ROW,
-    "torque": tables.TORQUE_ROW,
-    "suspect": tables.SUSPECT_ROW,
-    "difference": tables.DIFFERENCE_ROW,
-}
 _METHODS = Schema(
     "segment table posterior paper",
     shown="segment: {segment:name} | table (kg): {table[0]:2} | posterior (kg): {posterior[0]:2} | paper (kg): "
@@ -228,9 +216,7 @@ def _compared(found: SessionIdentification) -> list[Row]:
 
 
 def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tuple[str, Agreement]]:
-    """Return how well the table, the identified parameters, these with skin and flesh, and, beside the paper's,
-    those of the posterior agree.
-    """
+    """Return how well the table, the identified parameters and, beside the paper's, those of the posterior agree."""
     if found.posterior is None:
         extended = [("with skin and flesh", trial.extended_agreement)] if trial.extended_agreement else []
         return [("table", trial.table_agreement), ("identified", trial.identified_agreement), *extended]
@@ -256,9 +242,15 @@ def identification_section(found: SessionIdentification) -> str:
     return render(
         "identification.html.j2",
         filters={"spaced": spaced, "changed": changed, "signed": signed},
-        schemas=_SCHEMAS,
+        schemas={
+            "segment": tables.SEGMENT_ROW,
+            "torque": tables.TORQUE_ROW,
+            "suspect": tables.SUSPECT_ROW,
+            "difference": tables.DIFFERENCE_ROW,
+        },
         one=one,
-        notes=[note for note in found.notes if not note.startswith(LISTED)],
+        # the page shows them as a table
+        notes=[note for note in found.notes if not note.startswith("Cannot be known")],
         failures=found.failures,
         girths="; ".join(f"{spaced(name)}: {spaced(', '.join(said))}" for name, said in one.body.girths.items()),
         forest=Markup(mass_figure(drawn, paper, carried)) if rows else "",
@@ -267,7 +259,7 @@ def identification_section(found: SessionIdentification) -> str:
         compared=_compared(found),
         segments=rows,
         quantities=QUANTITIES,
-        marks=MARKS,
+        marks={"known": "●", "partly known": "◐", "cannot be known": "○"},
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
         parted={row["trial"]: parted_gain(row["gain"]) for row in tables.VALIDATION_ROW.rows(found.validations)},

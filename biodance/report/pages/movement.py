@@ -50,12 +50,10 @@ _FIRST = (
 """Key values of walking that are seen at once; all others are folded."""
 
 
-_STRIDES = Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}")
 _KEYS = Schema(
     "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
 )
 _FILE_KEYS = Schema("", shown=f"{_KEYS.shown} | plug-in gait right: {{file_right}} | left there: {{file_left}}")
-_PROFILE = Schema("", shown="score: {value} | right: {right} | left: {left}")
 
 
 def movement_section(moved: SessionMovement) -> str:
@@ -69,10 +67,10 @@ def movement_section(moved: SessionMovement) -> str:
         "movement.html.j2",
         filters={"beside": _beside, "first_upper": first_upper},
         schemas={
-            "strides": _STRIDES,
+            "strides": Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}"),
             "keys": _FILE_KEYS if beside else _KEYS,
             "file_angle": FILE_ANGLE_ROW,
-            "profile": _PROFILE,
+            "profile": Schema("", shown="score: {value} | right: {right} | left: {left}"),
         },
         parts=parts,
         **_scores(*moved.scores),

@@ -33,8 +33,6 @@ from biodance.report.tables.schema import Row
 from biodance.report.tables.session import GAP_ROW
 from biodance.report.wording import format_number, headline_of, loud_and_noted, millimetres
 
-STATUS_WORDS = {"ok": "good", "warning": "with a note", "refused": "refused"}
-
 
 def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[TrialResult, list[Check | None]]]]:
     """Return the trials' checks as a table: its columns (what, limit), and per trial one check or None a column."""
@@ -132,13 +130,12 @@ def _contents(inner: str, *, replayed: bool) -> list[tuple[str, str]]:
     return [*seen, ("figures", "Forces and masses"), *others, ("body", "The body"), *last.items()]
 
 
-_UNFOLDED = {"verdict", "movement", "replay", "figures", "masses"}
 _SECTION = re.compile(r'<section id="(?P<id>[^"]+)">\s*(?P<title><h2>[^\n]*</h2>)(?P<rest>.*?)</section>', re.DOTALL)
 
 
 def _fold(found: re.Match[str]) -> str:
     where, title, rest = found.group("id", "title", "rest")
-    if where in _UNFOLDED:
+    if where in {"verdict", "movement", "replay", "figures", "masses"}:
         return found.group()
     return f'<details class="part"><summary>{title}</summary>\n<section id="{where}">{rest}</section></details>'
 
@@ -190,6 +187,6 @@ def page(
         diagnosis=Markup(diagnosis),
         movement=Markup(movement),
         identification=Markup(identified),
-        words=STATUS_WORDS,
+        words={"ok": "good", "warning": "with a note", "refused": "refused"},
     )
     return _SECTION.sub(_fold, whole)

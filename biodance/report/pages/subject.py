@@ -13,15 +13,7 @@ from biodance.body.body import Body
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.summary import KeySummary, Repetitions
 from biodance.display import BLACK, BLUE, GREY, spaced
-from biodance.pipeline.movement import (
-    WHY_DOUBTED,
-    WHY_FAULTY,
-    WHY_IMPOSSIBLE,
-    WHY_NOTHING,
-    WHY_STOPPED,
-    PartMass,
-    SubjectAccount,
-)
+from biodance.pipeline import movement
 from biodance.pipeline.still import silhouettes
 from biodance.records import SIDES, Array
 from biodance.report.figures import vector as svg
@@ -206,11 +198,11 @@ PLAIN_NAMES = {
     "left_forearm_hand": N_("left lower arm and hand"),
 }
 _WHY = {
-    WHY_STOPPED: N_("The work was stopped before its end."),
-    WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
-    WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
-    WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
-    WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
+    movement.WHY_STOPPED: N_("The work was stopped before its end."),
+    movement.WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
+    movement.WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
+    movement.WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
+    movement.WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
     "mass on the plates": N_("The weight on our plates was not the weight we wrote down."),
     "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
     "marker distance": N_("The small balls on your skin were not where our model of you had them."),
@@ -222,12 +214,12 @@ _WHY = {
 _ELSE = N_("One of our checks failed.")
 
 
-def kilograms(part: PartMass, words: Language) -> str:
+def kilograms(part: movement.PartMass, words: Language) -> str:
     """Return the range of a part; "not measured well" where there is none."""
     return _between(part.low, part.high, words) if part.measured else words.say("not measured well")
 
 
-def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str:
+def subject_page(account: movement.SubjectAccount, language: str | Path = ENGLISH) -> str:
     """Return the page as HTML text in a ``language`` of `read_language`; the same account gives the same characters."""
     from markupsafe import Markup
 
@@ -255,7 +247,7 @@ def subject_page(account: SubjectAccount, language: str | Path = ENGLISH) -> str
     )
 
 
-def _picture(account: SubjectAccount, words: Language, room: _Room) -> str:
+def _picture(account: movement.SubjectAccount, words: Language, room: _Room) -> str:
     """Return the address of the picture, "" without a body; on a phone the parts have no names: the table has."""
     if account.body is None or not account.parts:
         return ""
@@ -267,7 +259,7 @@ def _picture(account: SubjectAccount, words: Language, room: _Room) -> str:
     return "data:image/svg+xml;base64," + b64encode(drawn.encode()).decode("ascii")
 
 
-def _name(part: PartMass, words: Language) -> str:
+def _name(part: movement.PartMass, words: Language) -> str:
     *first, last = [words.say(PLAIN_NAMES[one]) if one in PLAIN_NAMES else spaced(one) for one in part.segments]
     return words.say("%(first)s and %(last)s", first=", ".join(first), last=last) if first else last
 

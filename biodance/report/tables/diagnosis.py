@@ -204,7 +204,6 @@ _FORESIGHT = Schema(
 
 FIRST = 5
 """Changes that are told first."""
-_LEARNED = 0.9  # Times the table's standard deviation of a mass: less is left of what a dance teaches
 
 
 def seen_causes(found: Row) -> list[tuple[str, str]]:
@@ -220,7 +219,7 @@ def _learned(known: "Expectation | None") -> str:
     rows = [
         f"{spaced(name)} ± {SIGMAS * after:.2g} kg ({SIGMAS * before:.2g})"
         for name, before, after in zip(known.segments, known.mass[0], known.mass[-1], strict=True)
-        if after < _LEARNED * before
+        if after < 0.9 * before
     ]
     return f"Masses that it teaches (by the table alone): {', '.join(rows)}." if rows else "It teaches no mass."
 

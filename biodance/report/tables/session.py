@@ -58,9 +58,6 @@ _KEY = Schema(
 )
 
 
-_SCORED = ("ours", "beside", "conventional")
-
-
 def gait_document(moved: SessionMovement | None) -> Row | None:
     """Return the gait of a session; None where nobody walks.
 
@@ -91,7 +88,9 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
         "curves_beside": _MEAN.rows(found.file_groups),
         "curves_conventional": _MEAN.rows(found.conventional_groups),
         "key_values": _KEY.rows(found.keys),
-        "scores": dict(zip(_SCORED, map(_scores, moved.scores), strict=True)) if moved.scores[0] else None,
+        "scores": dict(zip(("ours", "beside", "conventional"), map(_scores, moved.scores), strict=True))
+        if moved.scores[0]
+        else None,
     }
 
 
@@ -247,7 +246,6 @@ _MOVED = Schema(
         "file_events": Schema("down late_s=late sd_s=sd count missed"),
     },
 )
-_MOVEMENT = Schema("parameters mass_kg=mass left_out", {"trials": _MOVED})
 
 
 def movement_document(moved: SessionMovement | None) -> Row | None:
@@ -257,7 +255,7 @@ def movement_document(moved: SessionMovement | None) -> Row | None:
     quantity and side: extremes of the mean over ``count`` repetitions and where in the cycle; ``sd_mean`` between
     repetitions, ``parameters_sd_mean`` what the inertial parameters leave uncertain, both averaged over the cycle.
     """
-    return _MOVEMENT.told(moved)
+    return Schema("parameters mass_kg=mass left_out", {"trials": _MOVED}).told(moved)
 
 
 _CYCLE = Schema("cycle=0 kind=1.kind cycle_side=1.side start_s=1.start end_s=1.end off_s=1.off")

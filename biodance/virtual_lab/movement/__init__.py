@@ -76,7 +76,6 @@ FIELDS: dict[str, tuple[float, ...]] = {
     "shift": (0.5,),
 }
 """Every field of a posture with its value in "stand"."""
-_STANCES = ("parallel", "right_forward")
 
 
 @dataclass(frozen=True)
@@ -219,7 +218,7 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     name, role, stance = str(given["name"]), str(given.get("role", "fit")), str(given.get("stance", "parallel"))
     if role not in ROLES:
         raise UnknownName.of(f"role of trial {name!r} in {path}", role, ROLES)
-    refuse_unknown(f"stance of trial {name!r} in {path}", stance, _STANCES)
+    refuse_unknown(f"stance of trial {name!r} in {path}", stance, ("parallel", "right_forward"))
     lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
     if "gait" in given:
         refuse_unknown(f"gait of trial {name!r} in {path}", str(given["gait"]), GAITS)

@@ -50,14 +50,10 @@ class Aim:
     def at(self, time: Array) -> Array:
         """Return the point (T, 3) m at ``time`` (T,) s."""
         # Fourier coefficients of a real periodic curve; those beyond the mean stand for a pair of frequencies.
-        spectrum = np.fft.rfft(self.sway, axis=0)[: HARMONICS + 1] / len(self.sway)
+        spectrum = np.fft.rfft(self.sway, axis=0)[: 6 + 1] / len(self.sway)
         wave = np.exp(2j * np.pi * np.outer(time / self.period, np.arange(len(spectrum))))
         wave[:, 1:] *= 2
         return np.column_stack([(wave @ spectrum).real, np.full(time.size, self.height)])
-
-
-HARMONICS = 6
-"""Of the stride, in the sway of the point at which forces aim."""
 
 
 @dataclass(frozen=True)
@@ -136,9 +132,7 @@ def _mean_pulse(gait: Gait) -> float:
 
 
 def _rolling(foot: BeltFoot, gait: Gait, s: Array) -> tuple[Array, Array, Array]:
-    """Return pitch (T,) rad, x and z (T,) m of the ankle in stance: turning over the heel, flat, over the toes, while
-    the belt carries it back.
-    """
+    """Return pitch (T,) rad, x and z (T,) m of the ankle in stance: over the heel, flat, over the toes on the belt."""
     first, last = gait.flat
     over = np.maximum(s - last, 0.0) / (1 - last)
     pitch = gait.strike * (1 - septic(s / first)) - gait.push * over**3 * (2 - over)
@@ -185,15 +179,10 @@ _ROUNDS, _LEARNED, _EASE = 300, 30, 0.5
 _AIM = {False: 0.57, True: 0.75}
 """Of stature, height at which the ground forces aim: the centre of mass in walking, above it in running (Maus et al.
 2010, doi:10.1038/ncomms1073)."""
-_SPIN, _PLACE = 1e-3, 1e-6
-"""N·m·s and m: a stride is settled when angular momentum and centre of mass are this close to the forces' own."""
-_SHORT = 1e-3
-"""m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
 _PAD = 12  # Nodes of the strides before and after with which a stride's derivatives are taken
 _LATERAL = np.array([0.0, -1.0, 0.0])
 _TURNS = np.array([0.022, 0.022, 0.005])
 """Of mass times stature squared: about how much turns with the pelvis, per axis of the belt."""
-_STATURE = 1.75  # m of the person whose gait is described by `GAITS`; others go in proportion
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +331,7 @@ def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> Found
         # Only up to a constant: a body that turns evenly has one, too.
         lacks = lacks - lacks.mean(axis=0)
         missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
-        if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
+        if missed < 1e-3 and off < 1e-6 and abs(short) < 1e-3:  # N·m·s and m
             return FoundStride(q, aim, twist, missed)
         level, root = level - _EASE * short, root + _EASE * (com - centre)
         # Momentum over inertia is a rate; its integral the angle still to turn.
@@ -453,10 +442,8 @@ def perform_gait(
 
 
 def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, speed: float, stature: float) -> Gait:
-    """Return the gait of this trial: lengths as the ``stature`` m, times and speed as its square root (both pendulums
-    alike), and everything but the belt's ``speed`` (0: the gait's) a little its own.
-    """
-    size = stature / _STATURE
+    """Return the gait of this trial: in proportion to the ``stature``, all but the ``speed`` a little its own."""
+    size = stature / 1.75  # m of the person whose gait is described by `GAITS`
     names = ("width", "strike", "push", "clearance", "arm", "elbow", "lean")
     own = {name: getattr(gait, name) * float(1 + tolerances.performance * rng.normal()) for name in names}
     own = {name: value * (size if name in ("width", "clearance") else 1) for name, value in own.items()}

@@ -32,8 +32,6 @@ NODE_RATE = 100.0
 MARGIN = 0.1
 """s of motion before and after the recording, for late force samples."""
 _ROUNDS = 12  # Largest number of balance corrections; 5 to 8 suffice
-SETTLED = 0.004
-"""m: the balance is settled when the zero-moment point is everywhere this close to the place wanted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +154,7 @@ def keep_balance(
         vertical = value[:, 2]
         # Zero-moment point of the needed wrench.
         error = np.stack([-value[:, 4], value[:, 3]], axis=1) / vertical[:, None] - target
-        if np.abs(error).max() < SETTLED:
+        if np.abs(error).max() < 0.004:  # m, everywhere
             break
         # Height over vertical acceleration: z m / Fz = z / (g + a).
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
@@ -237,8 +235,6 @@ _JOINTS = {
 """Joints of the model behind every field of a posture."""
 WANDER = 0.25
 """Hz: how fast the error of a person who follows a screen changes."""
-PELVIS = 0.4
-"""Share of the tracking error that the pelvis has: whoever stands on planted feet is held by them."""
 SMOOTH = 0.12
 """s: the plan's zero-moment point has corners where holds begin and end; nobody's has."""
 AWAY, SOFTNESS = 0.6, 80.0
@@ -276,13 +272,12 @@ class Performer:
         """
         seconds = round(duration * self.pace, 1)
         time = np.linspace(0.0, seconds, max(2, round(20 * seconds)) + 1)
-        tempo = np.exp(self.timing * smooth_noise(rng, time, columns=1, cutoff=TEMPO)[:, 0])
+        # Hz: how fast the tempo changes
+        tempo = np.exp(self.timing * smooth_noise(rng, time, columns=1, cutoff=0.2)[:, 0])
         done = np.concatenate([[0.0], np.cumsum(0.5 * (tempo[1:] + tempo[:-1]))])
         return seconds, time, duration * done / done[-1]
 
 
-TEMPO = 0.2
-"""Hz: how fast the tempo of a person who follows a screen changes."""
 USUAL_PERFORMER = Performer()
 """Seven degrees off in every joint, a fifth slower than shown."""
 PERFORMERS = {
@@ -344,7 +339,8 @@ def copy_dance(
     error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=posing.WIDTH, cutoff=WANDER)
     for field in _JOINTS:
         values[:, posing.COLUMNS[field]] += error[:, posing.COLUMNS[field]]
-    values[:, posing.COLUMNS["pelvis"]] += PELVIS * error[:, posing.COLUMNS["pelvis"]]
+    # whoever stands on planted feet is held by them
+    values[:, posing.COLUMNS["pelvis"]] += 0.4 * error[:, posing.COLUMNS["pelvis"]]
     if shown.seat:
         stance = posing.take_seat(centre, heading, rng)
         values[:, posing.SHIFT] = np.clip(0.5 - pressure[:, 1] / posing.LEGS_APART, 0.0, 1.0)
@@ -405,11 +401,7 @@ def _height(person: Person, pose: posing.Pose, curves: posing.Curves, stance: po
 
 
 def _reach(body: Body, turn: Array, xy: Array, ankle: dict[str, Array], raised: Array) -> tuple[Array, float]:
-    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the legs' length m.
-
-    A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning
-    body).
-    """
+    """Return the highest place (T,) m of a pelvis, and the legs' length m; a foot gives way as it rises."""
     tops, length = posing.leg_tops(body, turn, xy, ankle)
     # Soft minimum: -log(sum of exp(-k h)) / k; a raised foot is let go by metres.
     return -logsumexp(-SOFTNESS * (tops + AWAY * raised.T), axis=0) / SOFTNESS, length

@@ -334,9 +334,7 @@ def sit(person: Person, pose: Pose, curves: Curves, place: FootStance, hips: flo
 
 
 def _on_seat(angle: Array, turn: Array, thigh: float) -> Array:
-    """Return the hip's flexion (T,) rad with which a knee comes no lower than the seat lets it, thighs ``thigh`` m
-    long: at adduction a and flexion f of an upright pelvis the knee is thigh cos f cos a below the hip.
-    """
+    """Return the hip's flexion (T,) rad with which a knee comes no lower than the seat lets it: thigh cos f cos a."""
     raised = np.arcsin(np.clip(turn[:, 2, 0], -1.0, 1.0))  # the pelvis' own forward axis, over the horizontal
     # cos f cos a = sinks / thigh, less what the pelvis leans itself; adduction to 60 degrees at most.
     least = np.arccos(np.clip(_SINKS / (thigh * np.maximum(np.cos(angle[:, 1]), 0.5)), -1.0, 1.0)) - raised

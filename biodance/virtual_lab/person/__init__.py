@@ -284,49 +284,43 @@ def _habits(size: skeleton.Proportions, seed: int) -> Habits:
 _REPLACED = {"shank": ("shank", "foot"), "foot": ("foot",), "forearm": ("forearm", "hand")}
 """What a prosthesis replaces, by its first true segment."""
 _STUMP = 0.85
-"""Share of its length to which the matter of the first segment is squeezed towards the joint: a stump in a socket above
-a tube."""
+"""Share of its length to which the first segment is squeezed towards the joint: a stump in a socket above a tube."""
 
 
 def with_prostheses(person: Person, lighter: Mapping[str, float]) -> Person:
     """Return the person with prostheses, each so many kg ``lighter`` than the limb from its first segment on.
 
+    Such a limb begins with a shank, foot or forearm. On the scale the person weighs what was declared, so that all
+    other segments weigh more.
+
     Raises
     ------
     UnknownName
-        No prosthesis begins there.
+        No prosthesis begins with that segment.
     BiodanceError
-        The limb does not weigh as much.
+        The limb is no heavier than it shall be lighter.
     """
     sip = person.body.sip
     for segment, less in lighter.items():
-        sip = _fit_prosthesis(sip, segment, less)
+        side, _, first = segment.removesuffix("_hand").partition("_")
+        if first not in _REPLACED or side not in SIDES:
+            legal = tuple(f"{side}_{one}" for side in SIDES for one in _REPLACED)
+            raise UnknownName.of("segment that a prosthesis begins with", segment, legal)
+        limb = [skeleton.TRUE_SEGMENTS.index(f"{side}_{part}") for part in _REPLACED[first]]
+        bodies, mass = [of_parameters(phi) for phi in sip.phi.reshape(-1, 10)], float(sip.mass[limb].sum())
+        if not 0 < less < mass:
+            raise BiodanceError(
+                f"{segment}: the limb weighs {mass:.2f} kg; it can be 0 to {mass:.2f} kg lighter, not {less}."
+            )
+        # y is along the limb: matter goes to `_STUMP` of its distance from the joint, the mass stays.
+        squeezed = np.diag([1.0, _STUMP, 1.0, 1.0])
+        bodies[limb[0]] = squeezed @ bodies[limb[0]] @ squeezed
+        total = float(sip.mass.sum())
+        # What the limb loses all others gain in proportion.
+        scale = [1 - less / mass if k in limb else 1 + less / (total - mass) for k in range(len(bodies))]
+        phi = np.concatenate([parameters_of_inertia(times * J) for times, J in zip(scale, bodies, strict=True)])
+        sip = Sip(sip.segments, phi, sip.covariance)
     return replace(person, body=replace(person.body, sip=sip))
-
-
-def _fit_prosthesis(sip: Sip, segment: str, less: float) -> Sip:
-    """Return the true parameters of somebody whose limb from ``segment`` on (a shank, foot or forearm) is a prosthesis
-    that is ``less`` kg lighter than the limb was; on the scale the person weighs what was declared, so that all other
-    segments weigh more.
-    """
-    side, _, first = segment.removesuffix("_hand").partition("_")
-    if first not in _REPLACED or side not in ("right", "left"):
-        legal = tuple(f"{side}_{one}" for side in ("right", "left") for one in _REPLACED)
-        raise UnknownName.of("segment that a prosthesis begins with", segment, legal)
-    limb = [skeleton.TRUE_SEGMENTS.index(f"{side}_{part}") for part in _REPLACED[first]]
-    bodies, mass = [of_parameters(phi) for phi in sip.phi.reshape(-1, 10)], float(sip.mass[limb].sum())
-    if not 0 < less < mass:
-        raise BiodanceError(
-            f"{segment}: the limb weighs {mass:.2f} kg; it can be 0 to {mass:.2f} kg lighter, not {less}."
-        )
-    # y is along the limb: matter goes to `_STUMP` of its distance from the joint, the mass stays.
-    squeezed = np.diag([1.0, _STUMP, 1.0, 1.0])
-    bodies[limb[0]] = squeezed @ bodies[limb[0]] @ squeezed
-    total = float(sip.mass.sum())
-    # What the limb loses all others gain in proportion.
-    scale = [1 - less / mass if k in limb else 1 + less / (total - mass) for k in range(len(bodies))]
-    phi = np.concatenate([parameters_of_inertia(times * J) for times, J in zip(scale, bodies, strict=True)])
-    return Sip(sip.segments, phi, sip.covariance)
 
 
 def reference_angles(person: Person) -> Array:

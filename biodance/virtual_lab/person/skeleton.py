@@ -13,7 +13,7 @@ in-situ measurements. Every tolerance can be set to zero alone (``dataclasses.re
 at zero.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 from zlib import crc32
@@ -168,51 +168,39 @@ def small_rotation(vector: Array) -> Array:
     return Rotation.from_rotvec(vector).as_matrix()
 
 
-class _Builder:
-    """Collects the joints of a skeleton in topological order."""
+def build_joints(size: Proportions) -> tuple[Joint, ...]:
+    """Return the 39 joints of a person of the given proportions, in topological order."""
+    joints, stature = list[Joint](), size["stature"]
 
-    def __init__(self, size: Proportions) -> None:
-        self.size = size
-        self.joints: list[Joint] = []
-
-    def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
+    def add(joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
         """Append one anatomical joint (rotations in turn) at ``place`` (3,) m in the parent's; return its index."""
-        rotations = ROTATIONS[joint]
         row = TRUE_SEGMENTS.index(segment) if segment else -1
-        for k, (motion, axis) in enumerate(rotations):
+        turn, shift = np.eye(3), np.array(place)
+        if segment:
+            turn, shift = small_rotation(size.axis_tilt[row]), shift + size.centre_shift[row]
+        for motion, axis in ROTATIONS[joint]:
             axis = axis * ([-1.0, -1.0, 1.0] if side == "left" else [1.0, 1.0, 1.0])
-            turn, shift = np.eye(3), np.zeros(3)
-            if k == 0:
-                shift = np.array(place)
-                if segment:
-                    shift = shift + self.size.centre_shift[row]
-                    turn = small_rotation(self.size.axis_tilt[row])
-            name = f"{side}_{joint}_{motion}" if side else f"{joint}_{motion}"
-            carried = row if k == len(rotations) - 1 and segment else -1
-            self.joints.append(Joint(name, parent, axis, turn, shift, carried))
-            parent = len(self.joints) - 1
+            joints.append(Joint(f"{side}_{joint}_{motion}".lstrip("_"), parent, axis, turn, shift, -1))
+            parent, turn, shift = len(joints) - 1, np.eye(3), np.zeros(3)
+        joints[-1] = replace(joints[-1], segment=row)
         return parent
 
-
-def build_joints(size: Proportions) -> tuple[Joint, ...]:
-    """Return the 39 joints of a person of the given proportions."""
-    build, stature = _Builder(size), size["stature"]
     for side in SIDES:
-        hip = build.add("hip", f"{side}_thigh", -1, on_side(np.array([0, 0, size["hips"] / 2]), side), side=side)
-        knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * _Y, side=side)
-        build.add("ankle", f"{side}_foot", knee, -size["shank"] * _Y, side=side)
-    lumbar = build.add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
-    thorax = build.add("thorax", "thorax", lumbar, np.array([0.004 * stature, size["lumbar"], 0]))
-    build.add("neck", "head", thorax, size["thorax"] * _Y)
+        hip = add("hip", f"{side}_thigh", -1, on_side(np.array([0, 0, size["hips"] / 2]), side), side=side)
+        knee = add("knee", f"{side}_shank", hip, -size["thigh"] * _Y, side=side)
+        add("ankle", f"{side}_foot", knee, -size["shank"] * _Y, side=side)
+    lumbar = add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
+    thorax = add("thorax", "thorax", lumbar, np.array([0.004 * stature, size["lumbar"], 0]))
+    add("neck", "head", thorax, size["thorax"] * _Y)
     for side in SIDES:
         sternum = np.array([0.025 * stature, size["thorax"] - 0.042 * stature, 0.012 * stature])
         shoulder = np.array([0.0, size["thorax"] - size["shoulder_drop"], size["shoulders"] / 2])
-        clavicle = build.add("clavicle", "", thorax, on_side(sternum, side), side=side)
-        arm = build.add("shoulder", f"{side}_upper_arm", clavicle, on_side(shoulder - sternum, side), side=side)
-        elbow = build.add("elbow", "", arm, -size["upper_arm"] * _Y, side=side)
-        forearm = build.add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
-        build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * _Y, side=side)
-    return tuple(build.joints)
+        clavicle = add("clavicle", "", thorax, on_side(sternum, side), side=side)
+        arm = add("shoulder", f"{side}_upper_arm", clavicle, on_side(shoulder - sternum, side), side=side)
+        elbow = add("elbow", "", arm, -size["upper_arm"] * _Y, side=side)
+        forearm = add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
+        add("wrist", f"{side}_hand", forearm, -size["forearm"] * _Y, side=side)
+    return tuple(joints)
 
 
 MARKER_RADIUS = 0.007
@@ -224,9 +212,7 @@ MarkerPlace = tuple[str, tuple[float, float, float]]
 
 
 def _places(size: Proportions) -> tuple[dict[str, MarkerPlace], dict[str, MarkerPlace]]:
-    """Return the places (segment, (3,) m) of the markers that exist on both sides, for the right side; and those on the
-    midline and of RBAK.
-    """
+    """Return places (segment, (3,) m) of paired markers, for the right side; and those of all others."""
     s = size["stature"]
     shoulder = size["thorax"] - size["shoulder_drop"]
     r = MARKER_RADIUS
