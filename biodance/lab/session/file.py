@@ -1,45 +1,8 @@
-"""``session.toml``: what the analyst says about the subject and the trials, with inheritance subject > session > trial.
+"""``session.toml``: what the analyst says about the subject, the trials, markers and plates, key by key as
+docs/session_folder.md tells it.
 
-```toml
-[subject]
-mass_kg = 66.2        # all keys may be left out
-height_m = 1.75
-sex = "F"             # or "M"
-age = 33
-name = "S01"
-
-[trials."static*"]    # file name without extension, * and ? allowed; the exact name wins over a pattern
-role = "static"       # static, fit, validate, check or skip
-
-[settings]            # as `biodance settings` prints them
-filter.cutoff = 6
-```
-
-``[markers] file = "my_set.toml"`` names the marker set that was worn (a set's name or a file, relative to this one);
-``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
-which segment.
-
-``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (names and possible values:
-`anthropometry/human/girths.csv`), ``foot_outline = {length = 26, breadth = 10, heel_breadth = 7}`` (cm) or
-``"feet.csv"`` how large the feet are (traced points, too), ``scan = "body.obj"`` names the closed surface of the
-standing person, in m (``scan_up`` its axis that points up, by default z).
-
-``[plates.plate1]`` gives or corrects a force plate: ``corners_m``, ``type``, ``channels``, ``sensitivity``,
-``origin_m``, the ``foot`` that stands on it, ``use = false``.
-
-``[markers] drop = ["T10"]`` leaves markers out of every trial. In a table ``[trials.NAME]``, ``exchange = [["LKNE",
-"RKNE"], ["LANK", "RANK", 1.2, 3.4]]`` gives two labels each other's places, from 1.2 to 3.4 s or in the whole trial;
-``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out, ``[[2.5, 3.1, "right"]]`` the cycles
-of that foot alone. ``events = [{side = "left", kind = "strike", time = 1.23}, ...]`` says all strikes and
-offs of a foot, in the place of those that would be found.
-
-``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
-0.6`` what is worn there in kg, on top of ``mass_kg``.
-
-``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
-
-A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
-the session's own file leaves out.
+The exact name of a trial wins over a pattern. A ``subject.toml`` or ``session.toml`` in the folder above (the subject's
+folder) has the same keys and fills in what the session's own file leaves out.
 """
 
 import csv
