@@ -249,7 +249,10 @@ def _room_for(body: Body, cut: Cut) -> Body:
     count, gone = len(body.segments), float(cut.phi[0] / body.sip.phi[10 * body.segment_index(cut.segment)])
     parts = []
     for k, part in enumerate(body.parts):
-        first = _first_joint(body, body.segment_joint[count + k])
+        first = body.segment_joint[count + k]  # of the chain from the segment that the part hangs on
+        above = body.joints[first].parent
+        while above >= 0 and not 0 <= body.joints[above].segment < count:
+            first, above = above, body.joints[above].parent
         moved = Part(part.name, count, part.share / gone)
         # The share was per kilogram of the whole: its whole has now this share of the old mass.
         stays = Part(part.name, part.segment, part.share / (1 - gone))
@@ -258,14 +261,6 @@ def _room_for(body: Body, cut: Cut) -> Body:
     joints = tuple(replace(j, segment=j.segment + (j.segment >= count)) for j in body.joints)
     worn = tuple(s + (s >= count) for s in body.markers.segment)
     return replace(body, parts=tuple(parts), joints=joints, markers=replace(body.markers, segment=worn))
-
-
-def _first_joint(body: Body, joint: int) -> int:
-    """Return the first joint of the chain from the segment that ``joint`` (an index) hangs on."""
-    above = body.joints[joint].parent
-    while above >= 0 and not 0 <= body.joints[above].segment < len(body.segments):
-        joint, above = above, body.joints[above].parent
-    return joint
 
 
 def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:

@@ -206,7 +206,12 @@ _CENTRE_SD = 0.010  # m, prior standard deviation of every centre of mass; the o
 def hoap3() -> Body:
     """Return the robot in configuration B (no battery, no wireless card): free root, nq = 28, nv = 27, no markers."""
     joints = _joints()
-    turns = _zero_posture(joints)
+    # lab_R_segment at zero angles, lab axes x forwards, y left, z up.
+    turns, chain = {"pelvis": parts.UPRIGHT}, list[Array]()
+    for joint in joints:
+        chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
+        if joint.segment >= 0:
+            turns[_SEGMENTS[joint.segment]] = chain[-1]
     lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]
     rows = [read_table("robots", "hoap3_joints").row(joint=joint.name) for joint in joints]
     corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in _SEGMENTS]
@@ -260,17 +265,6 @@ def _base(kind: str, side: str, joints: list[parts.Joint]) -> tuple[int, Array, 
         return -1, tilt @ elementary_rotation("z", np.pi / 2), _LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
     return waist, tilt, _ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
-
-
-def _zero_posture(joints: tuple[parts.Joint, ...]) -> dict[str, Array]:
-    """Return lab_R_segment (3, 3) of every segment at zero angles, lab axes x forwards, y left, z up."""
-    turns = {"pelvis": parts.UPRIGHT}
-    chain: list[Array] = []
-    for joint in joints:
-        chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
-        if joint.segment >= 0:
-            turns[_SEGMENTS[joint.segment]] = chain[-1]
-    return turns
 
 
 def _lump(row: TableRow, turn: Array) -> parts.RigidInertia:

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.motion.contact import Contact
@@ -39,8 +38,12 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
         # Over the same plate at the same time.
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
-        shortest = SHORTEST_CONTACT * wrench.rate
-        loaded = _without_short(np.nan_to_num(force) > FORCE_DOWN, shortest)
+        loaded, shortest = np.nan_to_num(force) > FORCE_DOWN, SHORTEST_CONTACT * wrench.rate
+        # Gaps first, then contacts: a flicker joins the contact that it interrupts.
+        for value in (False, True):
+            for start, stop in runs(loaded == value):
+                if stop - start < shortest and start > 0 and stop < len(loaded):
+                    loaded[start:stop] = not value
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):
                 continue
@@ -60,17 +63,6 @@ def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
     """
     ends = np.concatenate([plate.loaded[:, 0 if down else 1] for plate in plates]) if plates else np.zeros(0)
     return np.asarray(ends[np.abs(ends - time) < _TOGETHER])
-
-
-def _without_short(loaded: Mask, shortest: float) -> Mask:
-    """Return ``loaded`` (T,) without gaps and contacts shorter than ``shortest`` frames; the ends stay."""
-    kept = loaded.copy()
-    # Gaps first, then contacts: a flicker joins the contact that it interrupts.
-    for value in (False, True):
-        for start, stop in runs(kept == value):
-            if stop - start < shortest and start > 0 and stop < len(kept):
-                kept[start:stop] = not value
-    return kept
 
 
 _SWING = 0.25
@@ -291,7 +283,12 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     height, time = poses(body, motion.q).position[:, 0, 2], motion.time
     # Percentile: a jump of a marker is no height.
     top, centre = float(np.percentile(height, 98)), centre_of_mass(body, motion)
-    seated, cycles = _seated(body, soles, centre), list[Cycle]()
+    heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
+    ahead = (toe - heel).mean(axis=1)
+    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    # The smaller of both feet: the centre of mass of who sits lies behind both heels, as the feet point.
+    seated = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1) > _SEATED
+    cycles: list[Cycle] = []
     for first, stop in runs(height < top - _DEEP * _thigh_and_shank(body)):
         lowest = first + int(np.argmin(height[first:stop]))
         # Within `_UP` of the depth from the top: before and after this dip.
@@ -312,16 +309,6 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
             cycles.append(Cycle(trial, "squat", "both", *time[[before[-1], after[0], lowest]].tolist()))
     # Each overlaps itself: one that overlaps another has no standing between.
     return tuple(one for one in cycles if sum(map(one.overlaps, cycles)) == 1)
-
-
-def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
-    """Return (T,) True where the centre of mass (T, 3) m lies behind both heels, as the feet point."""
-    heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
-    ahead = (toe - heel).mean(axis=1)
-    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
-    # The smaller of both feet: behind both heels.
-    behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
-    return np.asarray(behind > _SEATED)
 
 
 _RISES = 0.05

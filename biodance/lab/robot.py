@@ -190,20 +190,7 @@ def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRe
     folder = Path(folder)
     if not folder.is_dir():
         raise SessionRefused(f"{folder}: is no folder. Give the folder with the encoders and the force plate files.")
-    said = _said(folder / _FILE)
-    rename: dict[str, str] = said["joints"].get("rename", {})
-    fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
-    for name in (*fixed, *rename.values()):
-        refuse_unknown("joint of the robot", name, joints)
-    pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
-    trials = tuple(
-        _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
-    )
-    return RobotRecording(folder, trials, fixed, _base(folder / _FILE, said.get("base", {})))
-
-
-def _said(path: Path) -> dict[str, Any]:
-    """Return the content of recording.toml, checked; empty without one."""
+    path = folder / _FILE
     content = read_toml(path) if path.is_file() else {}
     for key, value in content.items():
         if key not in _KEYS or not isinstance(value, _KEYS[key]):
@@ -213,7 +200,16 @@ def _said(path: Path) -> dict[str, Any]:
     strange = sorted(set(content.get("joints", {})) - {"rename", "fixed"})
     if strange:
         raise SessionRefused(f"{path}: [joints] {strange[0]} is no key; legal are rename and fixed.")
-    return {"joints": {}, "trials": {}, **content}
+    said = {"joints": {}, "trials": {}, **content}
+    rename: dict[str, str] = said["joints"].get("rename", {})
+    fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
+    for name in (*fixed, *rename.values()):
+        refuse_unknown("joint of the robot", name, joints)
+    pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
+    trials = tuple(
+        _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
+    )
+    return RobotRecording(folder, trials, fixed, _base(folder / _FILE, said.get("base", {})))
 
 
 def _base(path: Path, said: dict[str, Any]) -> BaseSensors:

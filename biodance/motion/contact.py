@@ -7,7 +7,7 @@ around it, what sticks out hangs in the air.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -202,13 +202,6 @@ def _of_plate(trial: Trial, place: Footing, rests: Mask, load: Mask, index: int)
             for foot, side in enumerate(SIDES)
         ),
     )
-
-
-def _unmeasured_notes(measured: Mask, found: Sequence[_Unmeasured]) -> tuple[str, ...]:
-    """Return how many frames are ``measured`` (T,), and how many are not for every reason ``found``, in words."""
-    counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
-    first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
-    return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
 
 
 _SLOWEST = 0.2
@@ -406,8 +399,10 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
         f"Where {', '.join(unplaced)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
         f"pressure is under it, and a foot partly beside its plate cannot be seen."
     )
+    counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
+    first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
     notes = (
-        _unmeasured_notes(measured, found)
+        (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
         + (hang,) * bool(feet.seated.any())
         + (nowhere,) * bool(unplaced)
         + feet.belted

@@ -276,10 +276,15 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
         if not stands[now, t] and stands[1 - now, t]:
             now = 1 - now
         foot[t] = now
-    _back_to_both(foot, stands)
+    both = np.asarray(stands.all(axis=0))
+    for change in (np.flatnonzero(np.diff(foot)) + 1).tolist():  # into the middle of the time before it on both feet
+        start = change
+        while start > 0 and both[start - 1] and foot[start - 1] != foot[change]:
+            start -= 1
+        foot[(start + change) // 2 : change] = foot[change]
     use: NDArray[np.bool_] = np.array(stands[foot, np.arange(foot.size)])
     wide = round(_AROUND * rate)
-    for change in np.flatnonzero(np.diff(foot)):
+    for change in np.flatnonzero(np.diff(foot)).tolist():
         use[max(0, change - wide) : change + wide + 1] = False
     # At both ends nothing tells whether the foot has just changed.
     use[:wide] = use[-wide:] = False
@@ -287,16 +292,6 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
         if stop - start < _SHORT * rate:
             use[start:stop] = False
     return foot, use
-
-
-def _back_to_both(foot: NDArray[np.intp], stands: NDArray[np.bool_]) -> None:
-    """Move every change of the standing foot back into the middle of the time before it in which both stand."""
-    both = np.asarray(stands.all(axis=0))
-    for change in np.flatnonzero(np.diff(foot)) + 1:
-        start = change
-        while start > 0 and both[start - 1] and foot[start - 1] != foot[change]:
-            start -= 1
-        foot[(start + change) // 2 : change] = foot[change]
 
 
 def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, Array]:

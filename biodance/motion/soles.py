@@ -313,7 +313,13 @@ def _spread_over(plates: tuple[Plate, ...], soles: Soles, touching: Mask, load: 
     parts = []
     for start in range(0, soles.time.size, _BLOCK):
         part = slice(start, start + _BLOCK)
-        samples = _samples(soles.outline[part])
+        outline = soles.outline[part]
+        outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
+        length = np.linalg.norm(outwards, axis=-1, keepdims=True)
+        narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards
+        # Corners and the middles of all pairs: points all over a convex sole.
+        middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
+        samples = np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
         over = np.stack([inside(plate, samples) >= 0 for plate in plates])
         if standing is not None:
             over[unplaced] = standing[:, part, :, None] & ~np.isnan(samples[..., 0])
@@ -337,16 +343,6 @@ def _standing(pressed: Mask, load: Mask, touching: Mask) -> Mask:
                 nearest = here[np.abs(frames[:, None] - here).argmin(axis=1)]
                 found[:, frames, foot] |= sure[:, nearest, foot]
     return found
-
-
-def _samples(outline: Array) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim, from their ``outline`` (T, 2, P, 3) m."""
-    outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
-    length = np.linalg.norm(outwards, axis=-1, keepdims=True)
-    narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards
-    # Corners and the middles of all pairs: points all over a convex sole.
-    middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
-    return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 
 
 def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: Mask) -> Array:

@@ -333,7 +333,15 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     way = tip - shoulder
     along = way / np.linalg.norm(way)
     angle = float(np.arctan2(sign * along[2], -along[1]))
-    _refuse_arm(side, skeleton, float(np.linalg.norm(way)), angle)
+    if angle < _APART:
+        raise SessionRefused(_touching(side, f"it hangs {np.degrees(angle):.0f} degrees from the vertical"))
+    reach = float(np.linalg.norm(way))
+    whole = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + _HAND * skeleton.stature
+    if abs(reach / whole - 1) > _REACH:
+        raise SessionRefused(
+            f"[subject] scan: from the {side} shoulder to the farthest point sideways it is {reach:.2f} m, the "
+            f"person's arm is {whole:.2f} m long. Scan with straight arms, 30 degrees away from the trunk."
+        )
     tilts = np.linspace(0.0, min(0.8 * angle, _STEEPEST), _TILTS)
     places = shoulder - sign * np.linspace(0, _INSIDE * skeleton.stature, _PLACES)[:, None] * [0.0, 0.0, 1.0]
     # Normal between straight sideways and tilted up by at most the steepest plane.
@@ -351,17 +359,6 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     body = np.concatenate([body, hip])
     elbow = _joint(arm, shoulder + skeleton.lengths[f"{side}_upper_arm"] * along, -along)
     return arm, body, _Cut(shoulder, -plane, max(areas[best], 1e-4)), elbow
-
-
-def _refuse_arm(side: str, skeleton: Skeleton, reach: float, angle: float) -> None:
-    arm = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + _HAND * skeleton.stature
-    if angle < _APART:
-        raise SessionRefused(_touching(side, f"it hangs {np.degrees(angle):.0f} degrees from the vertical"))
-    if abs(reach / arm - 1) > _REACH:
-        raise SessionRefused(
-            f"[subject] scan: from the {side} shoulder to the farthest point sideways it is {reach:.2f} m, the "
-            f"person's arm is {arm:.2f} m long. Scan with straight arms, 30 degrees away from the trunk."
-        )
 
 
 def _touching(side: str, why: str) -> str:

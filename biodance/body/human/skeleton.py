@@ -287,7 +287,15 @@ def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str
     ``landmarks`` of its marker set: which labels mark the wrists.
     """
     if name == "neck":
-        return _with_neck(body)
+        places = neck_and_vertex(body)
+        if places is None:
+            return body
+        neck, vertex = places
+        seen = _worn(body, "trunk_head", body.markers.position[:, 1] > neck[1])
+        if len(seen) < _HEAD_MARKERS:
+            return body
+        head = share_of_body(body, "head", top=vertex, bottom=neck)
+        return _ranged(with_part(body, Cut("trunk_head", "head", _axes("neck"), neck, head, seen)))
     for side in SIDES:
         if name == "clavicles":
             body = _with_clavicle(body, side)
@@ -343,18 +351,6 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
     # Radii of gyration of the table's sagittal, longitudinal and transverse axes about x, y, z.
     inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
     return inertial_parameters(RigidInertia(mass, top + place * (bottom - top), inertia))
-
-
-def _with_neck(body: Body) -> Body:
-    places = neck_and_vertex(body)
-    if places is None:
-        return body
-    neck, vertex = places
-    seen = _worn(body, "trunk_head", body.markers.position[:, 1] > neck[1])
-    if len(seen) < _HEAD_MARKERS:
-        return body
-    head = share_of_body(body, "head", top=vertex, bottom=neck)
-    return _ranged(with_part(body, Cut("trunk_head", "head", _axes("neck"), neck, head, seen)))
 
 
 def _with_clavicle(body: Body, side: str) -> Body:

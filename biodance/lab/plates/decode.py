@@ -338,7 +338,13 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     # Points are rows: R p becomes p R'.
     lab = corners @ turn.T * unit
     _refuse_disorder(lab)
-    _refuse_size(lab, corners)
+    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
+    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
+        raise TrialRefused(
+            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
+            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
+            "POINT:UNITS."
+        )
     gap, skew = _gap(lab), _skew(lab)
     if gap > _NOT_CLOSED or skew > _NOT_CLOSED:
         raise TrialRefused(
@@ -436,16 +442,6 @@ def _refuse_disorder(lab: Array) -> None:
         f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the "
         "corners in the order +x+y, -x+y, -x-y, +x-y of the plate axes."
     )
-
-
-def _refuse_size(lab: Array, corners: Array) -> None:
-    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
-    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
-        raise TrialRefused(
-            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
-            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
-            "POINT:UNITS."
-        )
 
 
 def _gap(corners: Array) -> float:

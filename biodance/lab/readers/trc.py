@@ -137,7 +137,12 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     header = _header(rows, path)
     names, warnings = _labels(rows, path)
     numbers, raw_time, values, short = _table(rows, len(names), path)
-    unit = _unit(header, path)
+    unit = header.get("Units", "").lower()
+    unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
+    if unit not in METRES:
+        raise FileRefused(
+            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row."
+        )
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
     sides = extents(values, 1).max(axis=1)
@@ -227,16 +232,6 @@ def _rate(header: dict[str, str], path: Path) -> float:
             f"header."
         )
     return rate
-
-
-def _unit(header: dict[str, str], path: Path) -> str:
-    unit = header.get("Units", "").lower()
-    unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
-    if unit not in METRES:
-        raise FileRefused(
-            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row."
-        )
-    return unit
 
 
 def _labels(rows: list[str], path: Path) -> tuple[list[str], list[str]]:
