@@ -58,8 +58,6 @@ EMG = "_emg"
 _AGAINST_LAB = ("PelvisAngles", "FootProgressAngles")
 """What plug-in gait tells against the laboratory's axes."""
 _OBLIQUE = 6.0  # deg
-_NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
-_FEWEST = 20  # Frames without which nothing is compared
 _X = np.array([1.0, 0.0])
 
 
@@ -114,7 +112,8 @@ def compare_angles(
             continue
         known = motion.determined & np.isfinite(theirs).all(axis=1)
         ours, other = motion.angles[known, j], theirs[known, axis]
-        if ours.size < _FEWEST:
+        # Frames without which nothing is compared
+        if ours.size < 20:
             continue
         moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
         # The correlation of an angle that does not move is noise.
@@ -132,7 +131,8 @@ def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple
     comparisons = []
     for down in (True, False):
         delays = [cut.delay_of_nearest(events, one) for one in outputs.events if one.down is down]
-        late = [delay for delay in delays if abs(delay) < _NEAR_EVENT]
+        # 0.15 s within which an event of ours and one of the file are the same
+        late = [delay for delay in delays if abs(delay) < 0.15]
         if delays:
             mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
             comparisons.append(EventComparison(down, mean, sd, len(late), len(delays) - len(late)))

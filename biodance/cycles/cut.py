@@ -67,7 +67,6 @@ def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
 
 _SWING = 0.25
 """Of the leg's length: a foot that does not travel as far ahead of the other and back makes no step."""
-_APART = 0.5  # s between two strikes of one foot, at least
 _STRIKES, _LEAVES = 0.8, 0.6
 """Of the ground's speed under the pelvis. With them 57 strikes and 59 leavings of seven children, which their lab
 set by hand and force, are met to -4 and 0 ms in the mean (sd 15, 16 ms); with Zeni's extremes to -34 and +20 ms.
@@ -172,7 +171,8 @@ def _turning_points(path: Array, motion: Motion, prominence: float, height: Arra
     # A foot on the ground goes backwards under the pelvis: the median of the negative speeds.
     ground = float(np.median(speed[speed < 0]))
     # A strike is a top of the heel's path, a leaving the lowest point of the toes'.
-    tops, _ = find_peaks(-path if toes else path, prominence=prominence, distance=max(1, round(_APART * rate)))
+    # 0.5 s between two strikes of one foot, at least
+    tops, _ = find_peaks(-path if toes else path, prominence=prominence, distance=max(1, round(0.5 * rate)))
     # From the strike on in time, from the leaving back: to where the foot has the ground's speed.
     step, level = (-1, _LEAVES) if toes else (1, _STRIKES)
     slow = level - speed / ground  # Share of the ground's speed that the foot lacks: it goes with the ground below 0
@@ -201,9 +201,6 @@ _DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at
 _UP = 0.1  # Of a repetition's depth within which the pelvis counts as up, or a countermovement has not begun
 _SEATED = 0.03
 """m that the centre of mass lies behind the heels of somebody who sits: standing so, one falls."""
-_MOVES = 0.05  # m/s of the centre of mass from which a rise has begun
-_SLIDES = 0.1  # m that a foot may travel in a squat or a rise
-_LANDS = 0.3  # s after a landing in which the way down of its absorption begins
 
 
 @dataclass(frozen=True)
@@ -236,7 +233,8 @@ class Cycle:
 
     def near(self, jump: "Cycle") -> bool:
         """Return whether it is a part of a ``jump``, or of its landing, which goes down like a squat."""
-        return self.start < jump.end + _LANDS and jump.start < self.end
+        # 0.3 s after a landing in which the way down of its absorption begins
+        return self.start < jump.end + 0.3 and jump.start < self.end
 
     def times(self) -> Array:
         """Return the times (101,) s of `PERCENT`."""
@@ -297,12 +295,14 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
         if not after.size or not motion.determined[first : after[0] + 1].all():
             continue
         path = soles.centre[first : after[0] + 1, :, :2]
-        if np.linalg.norm(path - path[0], axis=-1).max() > _SLIDES:
+        # 0.1 m that a foot may travel in a squat or a rise
+        if np.linalg.norm(path - path[0], axis=-1).max() > 0.1:
             continue
         if seated[first:stop].any():
             leaves = first + int(np.flatnonzero(seated[first:stop])[-1])
             speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
-            rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
+            # 0.05 m/s of the centre of mass from which a rise has begun
+            rest = np.flatnonzero(speed[: leaves + 1] < 0.05)
             instants = time[[int(rest[-1]) if rest.size else 0, after[0], leaves]]
             cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
         elif before.size:
@@ -317,7 +317,6 @@ _CLEAR = 0.04
 """m over its lowest place before and after at which a sole is in the air at the highest point of a jump."""
 _NEAR = 0.6
 """s before and after the highest point in which the feet stand: half the flight of a jump of 0.45 m, and a contact."""
-_SHORTEST_FLIGHT = 0.1  # s in the air: less is a hop in a march
 _BOTH_LEAVE = 0.12
 """s within which both feet leave the ground: who runs has one in the air long before."""
 
@@ -346,7 +345,8 @@ def jumps(
     # `_RISES` on either side of a top.
     tops, _ = find_peaks(height, prominence=_RISES)
     flights = [flight for top in tops if (flight := _flight(sole, int(top), near, motion.determined)) is not None]
-    found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= _SHORTEST_FLIGHT]
+    # 0.1 s in the air: less is a hop in a march
+    found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= 0.1]
     if feet is None:
         return tuple(found)
     total = feet["right_foot"].force[:, 2] + feet["left_foot"].force[:, 2]

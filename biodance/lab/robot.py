@@ -20,7 +20,6 @@ from biodance.spatial import wrench_about_point
 _ENCODER_TABLES = (".csv", ".parquet")
 _TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
-_LATE = 1.6  # of the usual step: from there on a sample is missing
 _LONGEST_GAP = 0.1
 """s without a sample over which angles are not interpolated: a joint moves visibly in it."""
 _TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
@@ -64,7 +63,8 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
     notes = [*cells.said[1:], *["Angles were converted from degrees."] * bool((factors != 1).any())]
     steps = np.diff(time)
-    late = np.flatnonzero(steps > _LATE * np.median(steps))
+    # Of the usual step: from there on a sample is missing
+    late = np.flatnonzero(steps > 1.6 * np.median(steps))
     if late.size:
         others = f" and at {late.size - 1} other place{'s' * (late.size > 2)}" if late.size > 1 else ""
         first = f"Samples are missing after {time[late[0]]:.3f} s{others}"

@@ -24,7 +24,6 @@ from biodance.records import SIDES, Array, Markers, Motion, Wrench, runs
 from biodance.records.motion import Encoders
 from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, wrench_about_point
 
-_LEAST = 3  # Markers that fix a posture
 _FAR = 0.02  # m RMS: markers so far from where they are said to be are not those
 
 
@@ -68,7 +67,8 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
         Markers are missing, too few, or not where they are said to be.
     """
     lacks = [name for name in places if name not in markers.names]
-    if lacks or len(places) < _LEAST:
+    # Markers that fix a posture
+    if lacks or len(places) < 3:
         what = f"markers {', '.join(lacks)} are missing" if lacks else f"{len(places)} markers tell no posture"
         raise TrialRefused(f"{where}: {what}; recording.toml [base] markers needs three and more of those recorded.")
     local = np.array(list(places.values())) @ UPRIGHT
@@ -103,7 +103,6 @@ the second where a step is so low that the first does not see it.
 """
 _AROUND = 0.25
 """s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
-_SHORT = 0.5  # s: shorter stances are looked over
 RATE = 100.0
 """Hz at which motion and wrench are compared."""
 Lean = NDArray[np.intp] | None
@@ -289,7 +288,8 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
     # At both ends nothing tells whether the foot has just changed.
     use[:wide] = use[-wide:] = False
     for start, stop in runs(use):
-        if stop - start < _SHORT * rate:
+        # 0.5 s: shorter stances are looked over
+        if stop - start < 0.5 * rate:
             use[start:stop] = False
     return foot, use
 
@@ -319,9 +319,6 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
 # correlation at the right delay is 1 in size, its angle is the turn; turns and shifts need no search. All delays at
 # which half of the shorter recording overlaps are tried at once (fast Fourier transform, gaps masked: Padfield 2012,
 # doi:10.1109/TIP.2011.2181402).
-
-_OVERLAP = 0.5  # Share of the shorter recording that must overlap
-_MOVES = 0.002  # m: centres of pressure that stay nearer than this (sd) tell no time
 
 
 @dataclass(frozen=True)
@@ -353,7 +350,8 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, withi
     seen = np.stack([np.interp(clock, measured.time, one) for one in measured.value.T], axis=1)
     path, mask = _path(needed.value), use & np.isfinite(_path(needed.value))
     other = _path(seen)
-    if path[mask].std() < _MOVES if mask.any() else True:
+    # 0.002 m: centres of pressure that stay nearer than this (sd) tell no time
+    if path[mask].std() < 0.002 if mask.any() else True:
         raise TrialRefused(
             "The centre of pressure hardly moves, so plate and encoders cannot be brought together. Record a motion "
             "that shifts the weight."
@@ -432,7 +430,8 @@ def _correlated(
     both = sums(x, y) / n - np.conj(mean_a) * mean_b
     own_a = sums(np.abs(x) ** 2, b_mask * 1.0).real / n - np.abs(mean_a) ** 2
     own_b = sums(a_mask * 1.0, np.abs(y) ** 2).real / n - np.abs(mean_b) ** 2
-    enough = (count >= _OVERLAP * min(a_mask.sum(), b_mask.sum())) & (own_a > 1e-8) & (own_b > 1e-8)
+    # Share of the shorter recording that must overlap
+    enough = (count >= 0.5 * min(a_mask.sum(), b_mask.sum())) & (own_a > 1e-8) & (own_b > 1e-8)
     scale = np.sqrt(np.where(enough, own_a * own_b, 1.0))
     return (
         np.where(enough, both / scale, 0),

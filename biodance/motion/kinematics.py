@@ -214,7 +214,6 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
     return PlacedJoints(joint_arrays(body)[3], rotation, origin, root, body.n_root)
 
 
-_SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
 _NO_LIMIT = np.array([[-np.inf]])
 
 
@@ -349,7 +348,8 @@ def chart_of(body: Body) -> Chart:
         # Meeting in one point, no rotation between, and square to each other: a ball joint.
         turns = np.array([two.rotation, three.rotation, axes @ axes.T])
         apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
-        if max(apart) < _SAME:
+        # 1e-8 m, and of the entries of rotation matrices: what differs by less is equal
+        if max(apart) < 1e-8:
             first.append(i)
             # +1 or -1: axes of the left side are mirrored, and turn the other way about each.
             sign.append(np.linalg.det(axes))

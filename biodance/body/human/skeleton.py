@@ -276,8 +276,6 @@ OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
 _ACROMION = 0.5
 """Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
-_BEYOND_WRIST = 0.03  # m: markers of the forearm so far beyond the wrist are worn on the hand
-_HEAD_MARKERS = 3
 
 
 def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
@@ -292,7 +290,7 @@ def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str
             return body
         neck, vertex = places
         seen = _worn(body, "trunk_head", body.markers.position[:, 1] > neck[1])
-        if len(seen) < _HEAD_MARKERS:
+        if len(seen) < 3:
             return body
         head = share_of_body(body, "head", top=vertex, bottom=neck)
         return _ranged(with_part(body, Cut("trunk_head", "head", _axes("neck"), neck, head, seen)))
@@ -378,7 +376,8 @@ def _with_wrist(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, 
     wrist, segment = _wrist(body, side, landmarks), f"{side}_forearm_hand"
     if wrist is None:
         return body
-    seen = _worn(body, segment, body.markers.position[:, 1] < wrist[1] - _BEYOND_WRIST)
+    # 0.03 m: markers of the forearm so far beyond the wrist are worn on the hand
+    seen = _worn(body, segment, body.markers.position[:, 1] < wrist[1] - 0.03)
     if not seen:
         return body
     table = read_segment_table("de_leva_1996")

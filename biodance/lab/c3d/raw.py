@@ -139,7 +139,6 @@ _SPELLINGS = {
     **{unit: unit for unit in _METRES},
     **dict.fromkeys(("inch", "inches"), "in"),
 }
-_PLATE = 0.6  # m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
 
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
 _BELIEVABLE = (0.05, 4.75)
@@ -189,7 +188,8 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     if corners.size >= 12 and np.isfinite(corners).all():
         longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
         if 0 < longest < math.inf:
-            return longest, _PLATE, "a plate side"
+            # 0.6 m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
+            return longest, 0.6, "a plate side"
     return math.nan, PERSON_SPAN, ""
 
 

@@ -31,12 +31,10 @@ LARGEST_SHARE = 1 / 3  # an offset of the sign of a load must stay below this sh
 _SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
 _DEAD, _LONG = 1.5, 0.5
 """N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
-_FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 _NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
-_UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 _SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
 _UNITS = {"m": 1.0, "mm": 0.001}
@@ -184,7 +182,8 @@ def find_baseline(vertical: Array, *, zero: tuple[int, int] | None, rate: float)
     or plainly no load.
     """
     written, why = _written(vertical, zero)
-    if written and written.stop - written.start >= _FEW:
+    # 10 samples: a shorter ZERO is only used where nothing better is found
+    if written and written.stop - written.start >= 10:
         return written
     found = _longest_unloaded(vertical, rate)
     if found is not None:
@@ -373,7 +372,8 @@ def is_rectangle(corners: Array) -> bool:
     # In any unit: as far apart as the sides of plates can be, and opposite ones against each other.
     if not lengths.min() * LONGEST_SIDE > SHORTEST_SIDE * lengths.max() > 0 or sides[0] @ sides[2] >= 0:
         return False
-    return max(_gap(corners), _skew(corners)) < _UNEVEN * float(lengths.min())
+    # Share of the shortest side by which a rectangle may miss its closure
+    return max(_gap(corners), _skew(corners)) < 0.1 * float(lengths.min())
 
 
 def plate_axes(corners: Array) -> Array:

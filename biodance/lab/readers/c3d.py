@@ -22,16 +22,15 @@ NAME = "C3D"
 EXTENSIONS = (".c3d",)
 PREFERENCE = 0
 FOLLOWS_TOLD = True
-_KEY = 0x50  # Second byte of every C3D file
 
 
 def sniff(head: bytes) -> bool:
     """Return whether the head names a parameter block (2..127) and has the key of C3D files."""
-    return len(head) >= 2 and head[1] == _KEY and 2 <= head[0] <= 127 and b"\x00" in head
+    # Second byte of every C3D file
+    return len(head) >= 2 and head[1] == 0x50 and 2 <= head[0] <= 127 and b"\x00" in head
 
 
 _CLOUD = 6  # Markers that show how a body lies
-_LONGER = 1.5
 _AXES = "XYZ"
 
 
@@ -196,7 +195,7 @@ def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
         return
     extent = np.median(sides, axis=0)
     longest = int(np.argmax(extent))
-    if longest != 2 and extent[longest] > _LONGER * extent[2]:
+    if longest != 2 and extent[longest] > 1.5 * extent[2]:
         raise FileRefused(
             f"{raw.path}: nothing says which way is up (no plates, no POINT:Y_SCREEN, no labels of head and feet), and "
             f"along {_AXES[longest]} the markers are {extent[longest] / extent[2]:.1f} times as long as along Z. Write "

@@ -32,9 +32,6 @@ from biodance.records import Array, Markers, Role, Source, Trial
 
 _HEADER_ROWS = 4
 _FRAME = re.compile(r"\s*\d+(\.0*)?(\s|$)")  # A row that begins with the number of a frame
-_WIDEST = 50.0  # m, between the markers of one frame
-_NARROWEST = 0.05  # m, the same of a hand
-_FEW = 4  # markers, fewer of which may lie anywhere
 _TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 
 NAME = "markers of OpenSim"
@@ -147,7 +144,10 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
     sides = extents(values, 1).max(axis=1)
     spread = float(np.median(sides)) * METRES[unit] if sides.size else 0.0
-    if spread > _WIDEST or (0 < spread < _NARROWEST and len(names) >= _FEW):
+    # 50.0 m, between the markers of one frame
+    # 0.05 m, the same of a hand
+    # Markers, fewer of which may lie anywhere
+    if spread > 50.0 or (0 < spread < 0.05 and len(names) >= 4):
         raise FileRefused(
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."

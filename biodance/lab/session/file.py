@@ -85,7 +85,6 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
 
 
 _LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}  # m
-_HEEL = 0.15  # Share of the length, from the heel, at which its breadth is measured
 
 
 def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
@@ -165,7 +164,8 @@ def _sizes(points: Array) -> FootSizes:
     x = points[:, 0] - points[:, 0].min()
     length = float(x.max())
     # The heel's breadth: where a line across, at a share of the length, cuts the closed polygon
-    beyond, y, at = np.roll(x, -1), points[:, 1], _HEEL * length
+    # Share of the length, from the heel, at which its breadth is measured
+    beyond, y, at = np.roll(x, -1), points[:, 1], 0.15 * length
     cut = (x - at) * (beyond - at) < 0
     across = y[cut] + (at - x[cut]) / (beyond[cut] - x[cut]) * (np.roll(y, -1)[cut] - y[cut])
     heel = float(np.ptp(across)) if cut.any() else 0.0

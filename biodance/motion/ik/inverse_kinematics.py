@@ -154,7 +154,6 @@ than the reverse.
 MORE_SHARES = (0.25, 0.75)
 """Further guesses for doubtful frames, and for all first frames of a short trial."""
 _SHORT = 640  # Frames below which a trial has too few neighbours to correct a frame that started wrongly
-_NEIGHBOURS = 11  # Frames whose median fit a frame is compared with
 _DOUBT = (1.5, 0.001)
 """A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second
 (m).
@@ -204,7 +203,8 @@ def _retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     """Return ``found`` with doubtful frames tried again, from their markers and from sound frames beside."""
     # cost = 1/2 sum w r².
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
-    doubtful = rms > _DOUBT[0] * median_filter(rms, min(_NEIGHBOURS, len(rms)), mode="mirror") + _DOUBT[1]
+    # Frames whose median fit a frame is compared with
+    doubtful = rms > _DOUBT[0] * median_filter(rms, min(11, len(rms)), mode="mirror") + _DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
     if not (bad.size and sound.size):
         return found
@@ -410,9 +410,7 @@ def _too_few(body: Body, markers: Markers, open_coordinates: tuple[str, ...]) ->
     )
 
 
-_TOLERANCE = 1e-7  # m, largest slope of a solved frame, as in `solve_ik`
 _PATIENCE = 100  # Frames between two searches from the markers alone, where the fit has become bad
-_BAD = 0.05  # m: RMS distance beyond which the descent from the last frame is distrusted
 _ONE = np.arange(1)
 
 
@@ -423,7 +421,8 @@ class Follower:
         self.body = body
         self.names = tuple(name for name in body.markers.names if name in labels)
         self._columns = [body.markers.names.index(name) for name in self.names]
-        self._empty = marker_problem(body, self._columns, np.zeros((1, len(self.names), 3)), tolerance=_TOLERANCE)
+        # 1e-7 m, largest slope of a solved frame, as in `solve_ik`
+        self._empty = marker_problem(body, self._columns, np.zeros((1, len(self.names), 3)), tolerance=1e-7)
         self._weight = np.asarray(body.markers.weight)[self._columns]
         self._determined: dict[bytes, bool] = {}
         self._searched = -_PATIENCE
@@ -493,7 +492,8 @@ class Follower:
         found = minimise_markers(problem, _ONE, self.q[None])
         # cost = 1/2 sum w d², so the weighted mean square is 2 cost / sum w.
         rms = np.sqrt(2 * found.cost[0] / problem.weight.sum())
-        if rms > _BAD and self._frame - self._searched > _PATIENCE:
+        # 0.05 m: RMS distance beyond which the descent from the last frame is distrusted
+        if rms > 0.05 and self._frame - self._searched > _PATIENCE:
             self._searched = self._frame
             other = anew()
             return other if other.cost[0] < 0.8 * found.cost[0] else found

@@ -189,7 +189,6 @@ def _wider(covariance: Array, place: Array, usual: float, moved: float) -> float
     return evidence(moved) - evidence(usual)
 
 
-_POSTURES = 150  # Postures taken evenly from all moving trials together
 _STEPS, _SMALLEST = 8, 5e-4  # Most Gauss-Newton steps; m or rad below which a step ends the search
 
 
@@ -217,7 +216,8 @@ def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Marker
         raise TrialRefused(
             "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
         )
-    frames = frames[np.linspace(0, frames.size, min(_POSTURES, frames.size), endpoint=False).astype(int)]
+    # Postures taken evenly from all moving trials together
+    frames = frames[np.linspace(0, frames.size, min(150, frames.size), endpoint=False).astype(int)]
     xyz, first = np.full((frames.size, len(names), 3), np.nan), 0
     for one in trials:
         own = (frames >= first) & (frames < first + one.time.size)
