@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.human.conventional import ConventionalTrial
+from biodance.body.human.conventional import ConventionalModel
 from biodance.cycles import cut
 from biodance.cycles.curves import (
     CurveGroup,
@@ -99,7 +99,7 @@ def emg_curves(cycle: cut.Cycle, outputs: FileOutputs) -> Iterator[CycleCurve]:
 
 
 def compare_angles(
-    body: Body, motion: Motion, outputs: FileOutputs, conventional: ConventionalTrial | None = None
+    body: Body, motion: Motion, outputs: FileOutputs, conventional: ConventionalModel | None = None
 ) -> tuple[AngleComparison, ...]:
     """Return every angle that both have, over the frames in which both are known."""
     comparisons, here = [], {side: conventional.angles(side, _X) for side in SIDES} if conventional else {}
@@ -169,7 +169,7 @@ def _beside(
 
 
 def conventional_curves(
-    cycle: cut.Cycle, conventional: ConventionalTrial | None, body: Body, motion: Motion, ours: Sequence[CycleCurve]
+    cycle: cut.Cycle, conventional: ConventionalModel | None, body: Body, motion: Motion, ours: Sequence[CycleCurve]
 ) -> Iterator[CycleCurve]:
     """Yield the angles of the conventional gait model over a gait cycle, under our names.
 
@@ -337,7 +337,7 @@ def trial_movement(
     sip: Sip | None = None,
     contact: Contact | None = None,
     outputs: FileOutputs = NO_OUTPUTS,
-    conventional: ConventionalTrial | None = None,
+    conventional: ConventionalModel | None = None,
 ) -> TrialMovement:
     """Return what moved in a prepared trial.
 

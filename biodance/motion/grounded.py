@@ -178,7 +178,8 @@ def ground(
     if set(body.feet) != set(SIDES):
         raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
     turn, place, height = _soles(body, angle)
-    depth = under * _leg(body)
+    # Times the length m from root to sole at zero angles
+    depth = under * float(np.linalg.norm(_soles(body, np.zeros((1, len(body.joints))))[1][0, 0]))
     stands = height > -depth
     unclear = np.asarray(stands.all(axis=0) & (height > depth).any(axis=0))
     if lean is not None:
@@ -228,12 +229,6 @@ def ground_again(
     use, unclear = one.use[::every], one.unclear[::every]
     lean = None if one.lean is None else one.lean[::every]
     return replace(one, motion=motion, foot=foot, use=use, unclear=unclear, lean=lean, base=base, tilt=lean_over)
-
-
-def _leg(body: Body) -> float:
-    """Return the length m from root to sole at zero angles."""
-    _, place, _ = _soles(body, np.zeros((1, len(body.joints))))
-    return float(np.linalg.norm(place[0, 0]))
 
 
 def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:

@@ -298,7 +298,9 @@ def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str
         if name == "clavicles":
             body = _with_clavicle(body, side)
         elif name == "forearms":
-            body = _with_pronation(body, side, landmarks)
+            if _wrist(body, side, landmarks) is not None:
+                ((axis_name, axis),) = _axes("elbow", side).items()
+                body = _ranged(with_axis(body, f"{side}_elbow_flexion", axis_name, axis))
         else:
             body = _with_wrist(body, side, landmarks)
     return body
@@ -363,13 +365,6 @@ def _with_clavicle(body: Body, side: str) -> Body:
         return body
     place, axes = sternoclavicular(body, side), _axes("clavicle", side)
     return _ranged(with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), seen, (shoulder,))))
-
-
-def _with_pronation(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
-    if _wrist(body, side, landmarks) is None:
-        return body
-    ((name, axis),) = _axes("elbow", side).items()
-    return _ranged(with_axis(body, f"{side}_elbow_flexion", name, axis))
 
 
 def _with_wrist(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
