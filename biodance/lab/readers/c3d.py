@@ -83,7 +83,11 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     rate = raw.rate if markers is not None else math.nan
     worn = known.name if known is not None and markers is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
-    history = (_contents(raw), *raw.history, *labels.history, *axes_history, _seen(markers), *measure_history)
+    timed = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
+    channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
+    frames = f"{len(raw.points)} frames{timed} from frame {raw.first_frame} on"
+    held = f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}."
+    history = (held, *raw.history, *labels.history, *axes_history, _seen(markers), *measure_history)
     odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
     warnings = (*odd, *measure_warnings, *read.warnings)
     seen = (raw.path.stem, role, markers, read.plates, source, worn, measures)
@@ -126,13 +130,6 @@ def _turned(points: Array, axes: Array) -> Array:
         np.multiply(points[..., only], axis[only], out=turned[..., row])
     turned.setflags(write=False)
     return turned
-
-
-def _contents(raw: RawC3d) -> str:
-    rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
-    channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
-    frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
-    return f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}."
 
 
 def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:

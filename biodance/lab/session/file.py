@@ -322,7 +322,10 @@ def read_session_file(folder: Path) -> SessionFile:
     visit: dict[str, Any] = {}
     plates: dict[str, PlateEntry] = {}
     for content in contents:
-        plates |= {name: _over(plates.get(name), entry) for name, entry in content.plates.items()}
+        for name, entry in content.plates.items():
+            # What an inner file says of a plate, filled in by an outer one
+            outer = plates[name].model_dump(exclude_none=True) if name in plates else {}
+            plates[name] = PlateEntry(**{**outer, **entry.model_dump(exclude_none=True)})
         said |= content.subject.model_dump(exclude_none=True)
         visit |= content.session.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
@@ -350,12 +353,6 @@ def check_session_text(path: Path, text: str) -> None:
     _marker_set(path, content.markers)
     if content.markers.map:
         parse_map(content.markers.map, str(path))
-
-
-def _over(earlier: PlateEntry | None, entry: PlateEntry) -> PlateEntry:
-    """Return what an inner file says of a plate, filled in by an outer one."""
-    said = earlier.model_dump(exclude_none=True) if earlier is not None else {}
-    return PlateEntry(**{**said, **entry.model_dump(exclude_none=True)})
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:

@@ -222,7 +222,11 @@ def _told(
     notes = _placed_notes(moved, turned, start, found)
     if unseen := ", ".join(joint.replace("_", " ") for joint in kept if joint not in refused):
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {unseen}.")
-    notes += [_outside(joint, far) for joint, far in refused.items()]
+    notes += [
+        f"The movement would put the {joint.replace('_', ' ')} joint {1e3 * far:.0f} mm from the static trial's place, "
+        f"outside the body (at most {1e3 * FARTHEST:.0f} mm): it stays where the static trial puts it."
+        for joint, far in refused.items()
+    ]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
     notes += knees_elsewhere(scaling.centres, found.theta, found.information, known=(*wrong, *spared))
@@ -239,14 +243,6 @@ def _placed_notes(
     each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
     fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
     return [f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}."] if each else []
-
-
-def _outside(joint: str, far: float) -> str:
-    """Return what is said of a joint that the movement would put ``far`` m away from the static trial's place."""
-    return (
-        f"The movement would put the {joint.replace('_', ' ')} joint {1e3 * far:.0f} mm from the static trial's place, "
-        f"outside the body (at most {1e3 * FARTHEST:.0f} mm): it stays where the static trial puts it."
-    )
 
 
 def _contradiction(joint: str, far: float) -> str:
