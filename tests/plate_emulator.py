@@ -170,7 +170,7 @@ def raw_file(plates, signals, *, units=None, metres=0.001, zero=(1, 0), offsets=
     group = {k: v for k, v in group.items() if v is not None}
     analog = np.hstack(table)
     return RawC3d(
-        path=Path("made.c3d"), sha256="0" * 64, reader="none", labels=(), points=np.empty((0, 0, 3)), rate=100.0,
+        path=Path("made.c3d"), sha256="0" * 64, labels=(), points=np.empty((0, 0, 3)), rate=100.0,
         first_frame=1,
         analog=analog, analog_labels=tuple(names), analog_units=tuple(unit), analog_rate=rate,
         parameters={"FORCE_PLATFORM": group},

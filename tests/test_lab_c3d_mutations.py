@@ -27,11 +27,9 @@ def written(tmp_path_factory):
     xyz = generator.uniform(0.2, 1.5, (1, 6, 3)) + 0.01 * np.sin(np.arange(40) / 5)[:, None, None]
     wrench = generator.normal([0, 0, -700, 0, 0, 0], size=(400, 6))
     plate = PlateRecording(2, CORNERS, [0, 0, -0.04], wrench)
-    markers = Markers(tuple(f"LAB{i}" for i in range(6)), np.arange(40) / 100, xyz)
+    markers = Markers(tuple(f"Anna:LAB{i}" for i in range(6)), np.arange(40) / 100, xyz)
     said = {"PROCESSING": {"Bodymass": 70.0, "Height": 1750.0}}
-    write_c3d(
-        folder / "written.c3d", markers=markers, plates=[plate], analog_rate=1000.0, parameters=said, prefix="Anna:"
-    )
+    write_c3d(folder / "written.c3d", markers=markers, plates=[plate], analog_rate=1000.0, parameters=said)
     points = np.concatenate([np.round(1000 * xyz), np.zeros((40, 6, 1))], axis=2)
     transform = {"ANALOG": {"OFFSET": whole(*range(1, 7)), "SCALE": real(0.5, 2, 3, 1, 1, 1)}}
     for name, processor, scale in (

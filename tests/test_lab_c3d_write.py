@@ -1,6 +1,7 @@
 """Written C3D files read back in three readers; nothing is overwritten."""
 
 import warnings
+from dataclasses import replace
 
 import c3d
 import ezc3d
@@ -90,12 +91,11 @@ def test_parameters_labels_prefix_and_first_frame(path):
     }
     write_c3d(
         path,
-        markers=markers,
+        markers=replace(markers, names=tuple(f"Anna:{name}" for name in markers.names)),
         plates=[plate(2, 4)],
         analog_rate=1000.0,
         parameters=said,
         first_frame=695,
-        prefix="Anna:",
     )
     raw = read_raw(path)
     assert raw.first_frame == 695

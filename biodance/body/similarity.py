@@ -136,7 +136,6 @@ _RELATIVE_MASS_SD, _RELATIVE_INERTIA_SD = 0.15, 0.30
 """Of every segment: covers, cables and cards come and go (judgement; Bonnet 2016 finds 0.4 kg of 8 kg in all)."""
 POINT = 1e-6
 """m: links with a smaller radius of gyration are point masses, as some files write them."""
-_ROUNDING = 1e-4  # Of the largest moment of inertia: numbers of a file are rounded
 _COM_SD = 0.2  # m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3
 
 
@@ -174,7 +173,8 @@ def is_possible(lump: parts.RigidInertia) -> bool:
     """Whether some body has this mass, centre and inertia."""
     moments = np.linalg.eigvalsh(lump.inertia)
     # Triangle inequality: the largest moment at most the sum of the others.
-    return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -_ROUNDING * moments[-1])
+    # Of the largest moment of inertia: numbers of a file are rounded
+    return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -1e-4 * moments[-1])
 
 
 def com_deviation(lump: parts.RigidInertia) -> float:
@@ -194,7 +194,6 @@ _CARRIES = {
     "elbow_pitch": "forearm_hand",
 }
 """The last joint before each segment."""
-_SPEED = 1.0  # rad/s, the limit that Bonnet 2016 used for this robot
 _LEG_BASE, _ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
 """m: where legs start in the pelvis (ISB axes) and arms in the trunk (forwards, left, up); Fujitsu, table 6.1-2."""
 _SHOULDER = 0.111  # m, from the middle to either shoulder
@@ -206,7 +205,12 @@ _CENTRE_SD = 0.010  # m, prior standard deviation of every centre of mass; the o
 def hoap3() -> Body:
     """Return the robot in configuration B (no battery, no wireless card): free root, nq = 28, nv = 27, no markers."""
     joints = _joints()
-    turns = _zero_posture(joints)
+    # lab_R_segment at zero angles, lab axes x forwards, y left, z up.
+    turns, chain = {"pelvis": parts.UPRIGHT}, list[Array]()
+    for joint in joints:
+        chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
+        if joint.segment >= 0:
+            turns[_SEGMENTS[joint.segment]] = chain[-1]
     lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]
     rows = [read_table("robots", "hoap3_joints").row(joint=joint.name) for joint in joints]
     corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in _SEGMENTS]
@@ -214,12 +218,13 @@ def hoap3() -> Body:
     boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
     phi = np.concatenate([parts.inertial_parameters(lump) for lump in lumps])
     low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
+    # 1.0 rad/s, the limit that Bonnet 2016 used for this robot
     return Body(
         "HOAP-3",
         _SEGMENTS,
         joints,
         Sip(_SEGMENTS, phi, robot_covariance(lumps, [_CENTRE_SD] * len(lumps))),
-        parts.JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque),
+        parts.JointLimits(np.radians(low), np.radians(high), np.full(len(rows), 1.0), -torque, torque),
         parts.SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         boxes,
@@ -260,17 +265,6 @@ def _base(kind: str, side: str, joints: list[parts.Joint]) -> tuple[int, Array, 
         return -1, tilt @ elementary_rotation("z", np.pi / 2), _LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
     return waist, tilt, _ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
-
-
-def _zero_posture(joints: tuple[parts.Joint, ...]) -> dict[str, Array]:
-    """Return lab_R_segment (3, 3) of every segment at zero angles, lab axes x forwards, y left, z up."""
-    turns = {"pelvis": parts.UPRIGHT}
-    chain: list[Array] = []
-    for joint in joints:
-        chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
-        if joint.segment >= 0:
-            turns[_SEGMENTS[joint.segment]] = chain[-1]
-    return turns
 
 
 def _lump(row: TableRow, turn: Array) -> parts.RigidInertia:

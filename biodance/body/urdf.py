@@ -220,7 +220,16 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     if crossed and any(this in one and one.replace(this, that) == other for this, that in pairs):
         ahead = -ahead
     sideways = np.cross(ahead, up)
-    soles = _soles(file, feet, place, np.stack([ahead, up, sideways]))
+    axes, soles = np.stack([ahead, up, sideways]), {}
+    for side, carrier in feet.items():
+        if not carrier.corners.size:
+            why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
+            raise FileRefused(
+                f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>."
+            )
+        where = f"{file.path}: the foot {carrier.link}"
+        soles[side] = sole_outline(where, carrier.shapes, carrier.hulls, axes @ place[side][0])
+    soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
     right, left = (float(place[side][1] @ sideways) for side in SIDES)
     if not right > left:
         raise FileRefused(
@@ -228,22 +237,4 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
             f"the left one."
         )
     standing = replace(body, feet={side: parts.Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
-    turn = np.stack([ahead, up, sideways], axis=1)
-    return standing if np.array_equal(turn, np.eye(3)) else reframed(standing, 0, turn, np.zeros(3))
-
-
-def _soles(
-    file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], axes: Array
-) -> dict[str, Array]:
-    """Return the outlines (P, 3) m of both soles; ``axes`` (3, 3) rows: forwards, up, right of the root."""
-    soles = {}
-    for side, carrier in feet.items():
-        if not carrier.corners.size:
-            why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
-            raise FileRefused(
-                f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>."
-            )
-        own = axes @ place[side][0]
-        soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, own)
-    soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
-    return soles
+    return standing if np.array_equal(axes, np.eye(3)) else reframed(standing, 0, axes.T, np.zeros(3))

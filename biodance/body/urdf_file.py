@@ -62,7 +62,6 @@ def _mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
     return np.asarray(corners)
 
 
-_FLAT = 0.0005  # m: corners of a foot of boxes this near to the plane of its sole belong to it
 _LAYER = 0.002
 """m: corners of a mesh this near to its lowest plane belong to the sole; meshes have rounded edges."""
 _STEEPEST = 0.5  # Cosine of the largest angle between a sole and the ground at zero joint angles
@@ -96,7 +95,8 @@ def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array
         raise FileRefused(
             f"{where} has no face that points to the ground at zero joint angles. Give it a collision <box>."
         )
-    low = corners[corners @ down > (corners @ down).max() - (_LAYER if hulls else _FLAT)]
+    # 0.0005 m: corners of a foot of boxes this near to the plane of its sole belong to it
+    low = corners[corners @ down > (corners @ down).max() - (_LAYER if hulls else 0.0005)]
     flat = np.stack([low @ ahead, -(low @ right)], axis=1)  # x forwards, y left: counter-clockwise is from above
     try:
         outline = ConvexHull(flat).vertices

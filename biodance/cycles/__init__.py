@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.human.conventional import ConventionalTrial
+from biodance.body.human.conventional import ConventionalModel
 from biodance.cycles import cut
 from biodance.cycles.curves import (
     CurveGroup,
@@ -58,8 +58,6 @@ EMG = "_emg"
 _AGAINST_LAB = ("PelvisAngles", "FootProgressAngles")
 """What plug-in gait tells against the laboratory's axes."""
 _OBLIQUE = 6.0  # deg
-_NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
-_FEWEST = 20  # Frames without which nothing is compared
 _X = np.array([1.0, 0.0])
 
 
@@ -101,7 +99,7 @@ def emg_curves(cycle: cut.Cycle, outputs: FileOutputs) -> Iterator[CycleCurve]:
 
 
 def compare_angles(
-    body: Body, motion: Motion, outputs: FileOutputs, conventional: ConventionalTrial | None = None
+    body: Body, motion: Motion, outputs: FileOutputs, conventional: ConventionalModel | None = None
 ) -> tuple[AngleComparison, ...]:
     """Return every angle that both have, over the frames in which both are known."""
     comparisons, here = [], {side: conventional.angles(side, _X) for side in SIDES} if conventional else {}
@@ -114,7 +112,8 @@ def compare_angles(
             continue
         known = motion.determined & np.isfinite(theirs).all(axis=1)
         ours, other = motion.angles[known, j], theirs[known, axis]
-        if ours.size < _FEWEST:
+        # Frames without which nothing is compared
+        if ours.size < 20:
             continue
         moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
         # The correlation of an angle that does not move is noise.
@@ -132,7 +131,8 @@ def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple
     comparisons = []
     for down in (True, False):
         delays = [cut.delay_of_nearest(events, one) for one in outputs.events if one.down is down]
-        late = [delay for delay in delays if abs(delay) < _NEAR_EVENT]
+        # 0.15 s within which an event of ours and one of the file are the same
+        late = [delay for delay in delays if abs(delay) < 0.15]
         if delays:
             mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
             comparisons.append(EventComparison(down, mean, sd, len(late), len(delays) - len(late)))
@@ -169,7 +169,7 @@ def _beside(
 
 
 def conventional_curves(
-    cycle: cut.Cycle, conventional: ConventionalTrial | None, body: Body, motion: Motion, ours: Sequence[CycleCurve]
+    cycle: cut.Cycle, conventional: ConventionalModel | None, body: Body, motion: Motion, ours: Sequence[CycleCurve]
 ) -> Iterator[CycleCurve]:
     """Yield the angles of the conventional gait model over a gait cycle, under our names.
 
@@ -337,7 +337,7 @@ def trial_movement(
     sip: Sip | None = None,
     contact: Contact | None = None,
     outputs: FileOutputs = NO_OUTPUTS,
-    conventional: ConventionalTrial | None = None,
+    conventional: ConventionalModel | None = None,
 ) -> TrialMovement:
     """Return what moved in a prepared trial.
 

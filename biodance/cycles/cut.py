@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.motion.contact import Contact
@@ -39,8 +38,12 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
         # Over the same plate at the same time.
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
-        shortest = SHORTEST_CONTACT * wrench.rate
-        loaded = _without_short(np.nan_to_num(force) > FORCE_DOWN, shortest)
+        loaded, shortest = np.nan_to_num(force) > FORCE_DOWN, SHORTEST_CONTACT * wrench.rate
+        # Gaps first, then contacts: a flicker joins the contact that it interrupts.
+        for value in (False, True):
+            for start, stop in runs(loaded == value):
+                if stop - start < shortest and start > 0 and stop < len(loaded):
+                    loaded[start:stop] = not value
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):
                 continue
@@ -62,20 +65,8 @@ def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
     return np.asarray(ends[np.abs(ends - time) < _TOGETHER])
 
 
-def _without_short(loaded: Mask, shortest: float) -> Mask:
-    """Return ``loaded`` (T,) without gaps and contacts shorter than ``shortest`` frames; the ends stay."""
-    kept = loaded.copy()
-    # Gaps first, then contacts: a flicker joins the contact that it interrupts.
-    for value in (False, True):
-        for start, stop in runs(kept == value):
-            if stop - start < shortest and start > 0 and stop < len(kept):
-                kept[start:stop] = not value
-    return kept
-
-
 _SWING = 0.25
 """Of the leg's length: a foot that does not travel as far ahead of the other and back makes no step."""
-_APART = 0.5  # s between two strikes of one foot, at least
 _STRIKES, _LEAVES = 0.8, 0.6
 """Of the ground's speed under the pelvis. With them 57 strikes and 59 leavings of seven children, which their lab
 set by hand and force, are met to -4 and 0 ms in the mean (sd 15, 16 ms); with Zeni's extremes to -34 and +20 ms.
@@ -180,7 +171,8 @@ def _turning_points(path: Array, motion: Motion, prominence: float, height: Arra
     # A foot on the ground goes backwards under the pelvis: the median of the negative speeds.
     ground = float(np.median(speed[speed < 0]))
     # A strike is a top of the heel's path, a leaving the lowest point of the toes'.
-    tops, _ = find_peaks(-path if toes else path, prominence=prominence, distance=max(1, round(_APART * rate)))
+    # 0.5 s between two strikes of one foot, at least
+    tops, _ = find_peaks(-path if toes else path, prominence=prominence, distance=max(1, round(0.5 * rate)))
     # From the strike on in time, from the leaving back: to where the foot has the ground's speed.
     step, level = (-1, _LEAVES) if toes else (1, _STRIKES)
     slow = level - speed / ground  # Share of the ground's speed that the foot lacks: it goes with the ground below 0
@@ -209,9 +201,6 @@ _DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at
 _UP = 0.1  # Of a repetition's depth within which the pelvis counts as up, or a countermovement has not begun
 _SEATED = 0.03
 """m that the centre of mass lies behind the heels of somebody who sits: standing so, one falls."""
-_MOVES = 0.05  # m/s of the centre of mass from which a rise has begun
-_SLIDES = 0.1  # m that a foot may travel in a squat or a rise
-_LANDS = 0.3  # s after a landing in which the way down of its absorption begins
 
 
 @dataclass(frozen=True)
@@ -244,7 +233,8 @@ class Cycle:
 
     def near(self, jump: "Cycle") -> bool:
         """Return whether it is a part of a ``jump``, or of its landing, which goes down like a squat."""
-        return self.start < jump.end + _LANDS and jump.start < self.end
+        # 0.3 s after a landing in which the way down of its absorption begins
+        return self.start < jump.end + 0.3 and jump.start < self.end
 
     def times(self) -> Array:
         """Return the times (101,) s of `PERCENT`."""
@@ -291,7 +281,12 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     height, time = poses(body, motion.q).position[:, 0, 2], motion.time
     # Percentile: a jump of a marker is no height.
     top, centre = float(np.percentile(height, 98)), centre_of_mass(body, motion)
-    seated, cycles = _seated(body, soles, centre), list[Cycle]()
+    heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
+    ahead = (toe - heel).mean(axis=1)
+    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    # The smaller of both feet: the centre of mass of who sits lies behind both heels, as the feet point.
+    seated = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1) > _SEATED
+    cycles: list[Cycle] = []
     for first, stop in runs(height < top - _DEEP * _thigh_and_shank(body)):
         lowest = first + int(np.argmin(height[first:stop]))
         # Within `_UP` of the depth from the top: before and after this dip.
@@ -300,12 +295,14 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
         if not after.size or not motion.determined[first : after[0] + 1].all():
             continue
         path = soles.centre[first : after[0] + 1, :, :2]
-        if np.linalg.norm(path - path[0], axis=-1).max() > _SLIDES:
+        # 0.1 m that a foot may travel in a squat or a rise
+        if np.linalg.norm(path - path[0], axis=-1).max() > 0.1:
             continue
         if seated[first:stop].any():
             leaves = first + int(np.flatnonzero(seated[first:stop])[-1])
             speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
-            rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
+            # 0.05 m/s of the centre of mass from which a rise has begun
+            rest = np.flatnonzero(speed[: leaves + 1] < 0.05)
             instants = time[[int(rest[-1]) if rest.size else 0, after[0], leaves]]
             cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
         elif before.size:
@@ -314,23 +311,12 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     return tuple(one for one in cycles if sum(map(one.overlaps, cycles)) == 1)
 
 
-def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
-    """Return (T,) True where the centre of mass (T, 3) m lies behind both heels, as the feet point."""
-    heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
-    ahead = (toe - heel).mean(axis=1)
-    ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
-    # The smaller of both feet: behind both heels.
-    behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
-    return np.asarray(behind > _SEATED)
-
-
 _RISES = 0.05
 """m that the centre of mass comes down again on either side of the highest point of a jump, at least."""
 _CLEAR = 0.04
 """m over its lowest place before and after at which a sole is in the air at the highest point of a jump."""
 _NEAR = 0.6
 """s before and after the highest point in which the feet stand: half the flight of a jump of 0.45 m, and a contact."""
-_SHORTEST_FLIGHT = 0.1  # s in the air: less is a hop in a march
 _BOTH_LEAVE = 0.12
 """s within which both feet leave the ground: who runs has one in the air long before."""
 
@@ -359,7 +345,8 @@ def jumps(
     # `_RISES` on either side of a top.
     tops, _ = find_peaks(height, prominence=_RISES)
     flights = [flight for top in tops if (flight := _flight(sole, int(top), near, motion.determined)) is not None]
-    found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= _SHORTEST_FLIGHT]
+    # 0.1 s in the air: less is a hop in a march
+    found = [_cycle(trial, time, height, one) for one in flights if time[one[2]] - time[one[1]] >= 0.1]
     if feet is None:
         return tuple(found)
     total = feet["right_foot"].force[:, 2] + feet["left_foot"].force[:, 2]

@@ -14,7 +14,6 @@ from biodance.motion.soles import Soles
 from biodance.records import SIDES, Array, FootEvent, Mask, Wrench
 from biodance.settings import STANDARD_GRAVITY
 
-_BELT = 0.15  # m/s of a standing foot from which the ground is a belt
 _FLAT = (10.0, 25.0)
 """% of a cycle in which the foot stands flat, of runners too, and tells how fast the ground moves: after the loading
 response (to 12 %) and before the heel leaves (31 %; Perry and Burnfield 2010, ISBN 978-1-55642-766-4).
@@ -63,7 +62,8 @@ def strides(
         own, first, last = heel[:, SIDES.index(one.side)], *(one.start + p / 100 * one.duration for p in _FLAT)
         # While it stands the foot goes as the ground does: on a belt backwards.
         ground = (place_at(own, soles.time, last) - place_at(own, soles.time, first)) / (last - first)
-        ground = ground if np.linalg.norm(ground) > _BELT else np.zeros(2)  # m/s of what the foot stands on
+        # 0.15 m/s of a standing foot from which the ground is a belt
+        ground = ground if np.linalg.norm(ground) > 0.15 else np.zeros(2)  # m/s of what the foot stands on
         # Way of the heel relative to the ground.
         stride = place_at(own, soles.time, one.end) - place_at(own, soles.time, one.start) - ground * one.duration
         values = _values(one, other_off, other_strike, heel, soles.time, ground, stride)

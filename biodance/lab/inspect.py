@@ -224,14 +224,6 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
             f"again."
         )
     session = read_session(folder, subject_name=subject_name)
-    found = _found(session, target)
-    lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
-    write_whole(target, ("\n".join(lines) + "\n").encode())
-    return found
-
-
-def _found(session: Session, target: Path) -> dict[str, Any]:
-    """Return what the file will say, as plain values."""
     worn = next((trial.marker_set for trial in _statics_first(session) if trial.marker_set), "")
     trials, plates = [], []
     for trial in session.trials:
@@ -244,7 +236,7 @@ def _found(session: Session, target: Path) -> dict[str, Any]:
     who = session.subject
     numbers = {"mass_kg": who.mass, "height_m": who.stature, "age": who.age}
     known = {key: float(f"{value:.4g}") if math.isfinite(value) else None for key, value in numbers.items()}
-    return {
+    found = {
         "file": str(target),
         "subject": {"name": who.name, **known, "sex": who.sex, "guessed": list(who.guessed)},
         "trials": trials,
@@ -255,6 +247,9 @@ def _found(session: Session, target: Path) -> dict[str, Any]:
         "refused": dict(session.refused),
         "notes": list(session.notes),
     }
+    lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
+    write_whole(target, ("\n".join(lines) + "\n").encode())
+    return found
 
 
 def _statics_first(session: Session) -> list[Trial]:

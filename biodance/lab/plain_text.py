@@ -244,7 +244,6 @@ def plain_table(lines: Sequence[str], width: int) -> Array | None:
 
 _QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
-_HEADER_ROWS = 30
 _PARQUET = b"PAR1"
 _UNIT = re.compile(r"^(.*?)[\s_]*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
@@ -279,7 +278,7 @@ def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:
 
 def header_of(text: str, *, least: int = 4) -> tuple[int, str, tuple[str, ...]] | None:
     """Return row (from 0), separator and cells of the labels: the first row of >= ``least`` cells, most no numbers."""
-    for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
+    for row, line in enumerate(text.split("\n")[:30]):
         for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
             found = tuple(cell.strip() for cell in line.split(separator))
             words = sum(not _NUMBER.fullmatch(cell) for cell in found)

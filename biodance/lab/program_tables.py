@@ -24,8 +24,6 @@ from biodance.spatial import wrench_about_point
 Y_UP_TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """(3, 3) lab_R_file of a Y-up recording (OpenSim: x forward, y up, z right): x stays, y becomes z, z becomes -y."""
 
-_LONGEST_HEADER = 200
-
 
 @dataclass(frozen=True, eq=False)
 class TimeTable:
@@ -125,7 +123,7 @@ def _parts(
     """
     text, commas = with_points(read_text(path))
     rows = text.splitlines()
-    start = next((i for i, row in enumerate(rows[:_LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
+    start = next((i for i, row in enumerate(rows[:200]) if row.strip().lower() == "endheader"), None)
     if start is None:
         raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
     pairs = (re.split(r"\s*=\s*|\s+", row.strip(), maxsplit=1) for row in rows[:start])

@@ -20,7 +20,6 @@ from biodance.spatial import wrench_about_point
 _ENCODER_TABLES = (".csv", ".parquet")
 _TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
-_LATE = 1.6  # of the usual step: from there on a sample is missing
 _LONGEST_GAP = 0.1
 """s without a sample over which angles are not interpolated: a joint moves visibly in it."""
 _TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
@@ -64,7 +63,8 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
     notes = [*cells.said[1:], *["Angles were converted from degrees."] * bool((factors != 1).any())]
     steps = np.diff(time)
-    late = np.flatnonzero(steps > _LATE * np.median(steps))
+    # Of the usual step: from there on a sample is missing
+    late = np.flatnonzero(steps > 1.6 * np.median(steps))
     if late.size:
         others = f" and at {late.size - 1} other place{'s' * (late.size > 2)}" if late.size > 1 else ""
         first = f"Samples are missing after {time[late[0]]:.3f} s{others}"
@@ -190,20 +190,7 @@ def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRe
     folder = Path(folder)
     if not folder.is_dir():
         raise SessionRefused(f"{folder}: is no folder. Give the folder with the encoders and the force plate files.")
-    said = _said(folder / _FILE)
-    rename: dict[str, str] = said["joints"].get("rename", {})
-    fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
-    for name in (*fixed, *rename.values()):
-        refuse_unknown("joint of the robot", name, joints)
-    pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
-    trials = tuple(
-        _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
-    )
-    return RobotRecording(folder, trials, fixed, _base(folder / _FILE, said.get("base", {})))
-
-
-def _said(path: Path) -> dict[str, Any]:
-    """Return the content of recording.toml, checked; empty without one."""
+    path = folder / _FILE
     content = read_toml(path) if path.is_file() else {}
     for key, value in content.items():
         if key not in _KEYS or not isinstance(value, _KEYS[key]):
@@ -213,7 +200,16 @@ def _said(path: Path) -> dict[str, Any]:
     strange = sorted(set(content.get("joints", {})) - {"rename", "fixed"})
     if strange:
         raise SessionRefused(f"{path}: [joints] {strange[0]} is no key; legal are rename and fixed.")
-    return {"joints": {}, "trials": {}, **content}
+    said = {"joints": {}, "trials": {}, **content}
+    rename: dict[str, str] = said["joints"].get("rename", {})
+    fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
+    for name in (*fixed, *rename.values()):
+        refuse_unknown("joint of the robot", name, joints)
+    pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
+    trials = tuple(
+        _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
+    )
+    return RobotRecording(folder, trials, fixed, _base(folder / _FILE, said.get("base", {})))
 
 
 def _base(path: Path, said: dict[str, Any]) -> BaseSensors:

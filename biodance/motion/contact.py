@@ -7,7 +7,7 @@ around it, what sticks out hangs in the air.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -33,13 +33,11 @@ from biodance.motion.soles import (
 from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
 from biodance.settings import ContactRules
 
-_SHORTEST_FLIGHT = 0.05  # s: in less the parabola of the markers cannot be seen
 _FALLS = 0.6
 """Downward acceleration, in g, from which the markers fall freely. Whatever carries somebody makes the fall slower; the
 swing of the limbs leaves 0.95 to 1.1 for the mean of markers all over the body, 0.97 to 1.45 for those of the pelvis
 (legs that swing up push it down), which runners marked on the legs alone need: the mean of their markers is the legs'.
 """
-_PARABOLA = 0.005  # m, RMS, by which the mean of the markers may leave the parabola (limbs move)
 _LACKS, _ENDS = 0.15, 0.05
 """Share of the weight that the plates lack while something else carries, and under which it has ended. In clean squats
 and walks they lack less for more than half of `_LASTING`."""
@@ -78,14 +76,16 @@ def falls_freely(trial: Trial, start: int, stop: int) -> bool:
     span = slice(max(0, start - 1), min(trial.markers.time.size, stop + 1))
     time, height = trial.markers.time[span], trial.markers.xyz[span, :, 2]
     whole = np.isfinite(height).all(axis=0)
-    if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4:
+    # 0.05 s: in less the parabola of the markers cannot be seen
+    if time[-1] - time[0] < 0.05 or time.size < 4:
         return False
     for some in (whole, whole & _on(trial, "pelvis")):
         if some.any():
             mean, middle = height[:, some].mean(axis=1), time - time.mean()
             # z = c t² + ..: acceleration 2 c, downwards positive below.
             curve = np.polyfit(middle, mean, 2)
-            straight = np.sqrt(np.mean((np.polyval(curve, middle) - mean) ** 2)) < _PARABOLA
+            # 0.005 m, RMS, by which the mean of the markers may leave the parabola (limbs move)
+            straight = np.sqrt(np.mean((np.polyval(curve, middle) - mean) ** 2)) < 0.005
             if straight and -2 * curve[0] >= _FALLS * trial.settings.gravity:
                 return True
     return False
@@ -204,18 +204,8 @@ def _of_plate(trial: Trial, place: Footing, rests: Mask, load: Mask, index: int)
     )
 
 
-def _unmeasured_notes(measured: Mask, found: Sequence[_Unmeasured]) -> tuple[str, ...]:
-    """Return how many frames are ``measured`` (T,), and how many are not for every reason ``found``, in words."""
-    counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
-    first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
-    return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
-
-
 _SLOWEST = 0.2
 """m/s: a slower belt is none; feet creep that much in standing and at the edges of stance."""
-_RIGID = 0.25  # m/s: a sole whose points move more evenly than this lies flat on something
-_LOW = 0.03  # m over its lowest height in which a sole stands
-_EVEN = 0.15  # m/s around the median in which most flat soles move on a belt of constant speed
 _MOST = 0.6
 _FEWEST = 10  # Frames of flat soles that tell a belt
 
@@ -235,14 +225,17 @@ def belts(trial: Trial, soles: Soles, load: Mask) -> tuple[Array, tuple[str, ...
     spread = np.linalg.norm(velocity - velocity.mean(axis=2, keepdims=True), axis=-1).max(axis=2)
     height = soles.outline[..., 2].mean(axis=2)
     # Height over the lowest in which this foot was ever seen: the floor need not be known.
-    flat = (spread < _RIGID) & (height < np.nanmin(height, axis=0, initial=np.inf) + _LOW)
+    # 0.25 m/s: a sole whose points move more evenly than this lies flat on something
+    # 0.03 m over its lowest height in which a sole stands
+    flat = (spread < 0.25) & (height < np.nanmin(height, axis=0, initial=np.inf) + 0.03)
     for index, plate in enumerate(trial.plates):
         here = flat & on[:, :, index] & load[:, index, None]
         moving = velocity.mean(axis=2)[here]
         if len(moving) < _FEWEST:
             continue
         middle = np.median(moving, axis=0)
-        same = np.linalg.norm(moving - middle, axis=1) < _EVEN
+        # 0.15 m/s around the median in which most flat soles move on a belt of constant speed
+        same = np.linalg.norm(moving - middle, axis=1) < 0.15
         if np.linalg.norm(middle) > _SLOWEST and same.mean() >= _MOST:
             found[index] = moving[same].mean(axis=0)
             notes.append(
@@ -406,8 +399,10 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
         f"Where {', '.join(unplaced)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
         f"pressure is under it, and a foot partly beside its plate cannot be seen."
     )
+    counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
+    first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
     notes = (
-        _unmeasured_notes(measured, found)
+        (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
         + (hang,) * bool(feet.seated.any())
         + (nowhere,) * bool(unplaced)
         + feet.belted

@@ -24,7 +24,6 @@ from biodance.records import SIDES, Array, Markers, Motion, Wrench, runs
 from biodance.records.motion import Encoders
 from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, wrench_about_point
 
-_LEAST = 3  # Markers that fix a posture
 _FAR = 0.02  # m RMS: markers so far from where they are said to be are not those
 
 
@@ -68,7 +67,8 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
         Markers are missing, too few, or not where they are said to be.
     """
     lacks = [name for name in places if name not in markers.names]
-    if lacks or len(places) < _LEAST:
+    # Markers that fix a posture
+    if lacks or len(places) < 3:
         what = f"markers {', '.join(lacks)} are missing" if lacks else f"{len(places)} markers tell no posture"
         raise TrialRefused(f"{where}: {what}; recording.toml [base] markers needs three and more of those recorded.")
     local = np.array(list(places.values())) @ UPRIGHT
@@ -103,7 +103,6 @@ the second where a step is so low that the first does not see it.
 """
 _AROUND = 0.25
 """s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
-_SHORT = 0.5  # s: shorter stances are looked over
 RATE = 100.0
 """Hz at which motion and wrench are compared."""
 Lean = NDArray[np.intp] | None
@@ -179,7 +178,8 @@ def ground(
     if set(body.feet) != set(SIDES):
         raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
     turn, place, height = _soles(body, angle)
-    depth = under * _leg(body)
+    # Times the length m from root to sole at zero angles
+    depth = under * float(np.linalg.norm(_soles(body, np.zeros((1, len(body.joints))))[1][0, 0]))
     stands = height > -depth
     unclear = np.asarray(stands.all(axis=0) & (height > depth).any(axis=0))
     if lean is not None:
@@ -231,12 +231,6 @@ def ground_again(
     return replace(one, motion=motion, foot=foot, use=use, unclear=unclear, lean=lean, base=base, tilt=lean_over)
 
 
-def _leg(body: Body) -> float:
-    """Return the length m from root to sole at zero angles."""
-    _, place, _ = _soles(body, np.zeros((1, len(body.joints))))
-    return float(np.linalg.norm(place[0, 0]))
-
-
 def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
     """Return both soles in the root's frame, turn and place, and ``height`` (2, T) m of the other's lowest corner."""
     root = np.array([0.0, 0, 0, 0, 0, 0, 1])
@@ -276,27 +270,23 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
         if not stands[now, t] and stands[1 - now, t]:
             now = 1 - now
         foot[t] = now
-    _back_to_both(foot, stands)
-    use: NDArray[np.bool_] = np.array(stands[foot, np.arange(foot.size)])
-    wide = round(_AROUND * rate)
-    for change in np.flatnonzero(np.diff(foot)):
-        use[max(0, change - wide) : change + wide + 1] = False
-    # At both ends nothing tells whether the foot has just changed.
-    use[:wide] = use[-wide:] = False
-    for start, stop in runs(use):
-        if stop - start < _SHORT * rate:
-            use[start:stop] = False
-    return foot, use
-
-
-def _back_to_both(foot: NDArray[np.intp], stands: NDArray[np.bool_]) -> None:
-    """Move every change of the standing foot back into the middle of the time before it in which both stand."""
     both = np.asarray(stands.all(axis=0))
-    for change in np.flatnonzero(np.diff(foot)) + 1:
+    for change in (np.flatnonzero(np.diff(foot)) + 1).tolist():  # into the middle of the time before it on both feet
         start = change
         while start > 0 and both[start - 1] and foot[start - 1] != foot[change]:
             start -= 1
         foot[(start + change) // 2 : change] = foot[change]
+    use: NDArray[np.bool_] = np.array(stands[foot, np.arange(foot.size)])
+    wide = round(_AROUND * rate)
+    for change in np.flatnonzero(np.diff(foot)).tolist():
+        use[max(0, change - wide) : change + wide + 1] = False
+    # At both ends nothing tells whether the foot has just changed.
+    use[:wide] = use[-wide:] = False
+    for start, stop in runs(use):
+        # 0.5 s: shorter stances are looked over
+        if stop - start < 0.5 * rate:
+            use[start:stop] = False
+    return foot, use
 
 
 def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -324,9 +314,6 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
 # correlation at the right delay is 1 in size, its angle is the turn; turns and shifts need no search. All delays at
 # which half of the shorter recording overlaps are tried at once (fast Fourier transform, gaps masked: Padfield 2012,
 # doi:10.1109/TIP.2011.2181402).
-
-_OVERLAP = 0.5  # Share of the shorter recording that must overlap
-_MOVES = 0.002  # m: centres of pressure that stay nearer than this (sd) tell no time
 
 
 @dataclass(frozen=True)
@@ -358,7 +345,8 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, withi
     seen = np.stack([np.interp(clock, measured.time, one) for one in measured.value.T], axis=1)
     path, mask = _path(needed.value), use & np.isfinite(_path(needed.value))
     other = _path(seen)
-    if path[mask].std() < _MOVES if mask.any() else True:
+    # 0.002 m: centres of pressure that stay nearer than this (sd) tell no time
+    if path[mask].std() < 0.002 if mask.any() else True:
         raise TrialRefused(
             "The centre of pressure hardly moves, so plate and encoders cannot be brought together. Record a motion "
             "that shifts the weight."
@@ -437,7 +425,8 @@ def _correlated(
     both = sums(x, y) / n - np.conj(mean_a) * mean_b
     own_a = sums(np.abs(x) ** 2, b_mask * 1.0).real / n - np.abs(mean_a) ** 2
     own_b = sums(a_mask * 1.0, np.abs(y) ** 2).real / n - np.abs(mean_b) ** 2
-    enough = (count >= _OVERLAP * min(a_mask.sum(), b_mask.sum())) & (own_a > 1e-8) & (own_b > 1e-8)
+    # Share of the shorter recording that must overlap
+    enough = (count >= 0.5 * min(a_mask.sum(), b_mask.sum())) & (own_a > 1e-8) & (own_b > 1e-8)
     scale = np.sqrt(np.where(enough, own_a * own_b, 1.0))
     return (
         np.where(enough, both / scale, 0),

@@ -214,7 +214,6 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
     return PlacedJoints(joint_arrays(body)[3], rotation, origin, root, body.n_root)
 
 
-_SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
 _NO_LIMIT = np.array([[-np.inf]])
 
 
@@ -246,16 +245,12 @@ def _ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, uppe
         middle = np.where(upper - lower < 2 * np.pi, (lower + upper) / 2, near)
     # (pi + a, pi - b, pi + c) is the same rotation.
     other = np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one
-    both = [_turned_near(sign * angles, middle) for angles in (one, other)]
+    # Full turns added, within half a turn of the middle.
+    both = [middle + (sign * angles - middle + np.pi) % (2 * np.pi) - np.pi for angles in (one, other)]
     more = [np.maximum(np.maximum(lower - angles, angles - upper), 0.0).sum(axis=0) for angles in both]
     away = [np.abs(angles - near).sum(axis=0) for angles in both]
     better = (more[1] < more[0] - EQUAL_ANGLES) | ((more[1] < more[0] + EQUAL_ANGLES) & (away[1] < away[0]))
     return np.where(better, both[1], both[0])
-
-
-def _turned_near(angles: Array, middle: Array) -> Array:
-    """Return ``angles`` plus full turns, within half a turn of ``middle``."""
-    return middle + (angles - middle + np.pi) % (2 * np.pi) - np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +348,8 @@ def chart_of(body: Body) -> Chart:
         # Meeting in one point, no rotation between, and square to each other: a ball joint.
         turns = np.array([two.rotation, three.rotation, axes @ axes.T])
         apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
-        if max(apart) < _SAME:
+        # 1e-8 m, and of the entries of rotation matrices: what differs by less is equal
+        if max(apart) < 1e-8:
             first.append(i)
             # +1 or -1: axes of the left side are mirrored, and turn the other way about each.
             sign.append(np.linalg.det(axes))

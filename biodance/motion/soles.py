@@ -102,9 +102,6 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
     return Soles(motion.time, outline)
 
 
-_UNDER = 0.03  # m: a centre of pressure so near to a sole is under it
-
-
 def inside(plate: Plate, points: Array) -> Array:
     """Return how far points (..., 3) m are inside the plate from above: to the nearest edge, < 0 outside."""
     corners = plate.corners[:, :2]
@@ -137,7 +134,8 @@ def _pressed_by(plate: Plate, soles: Soles) -> Mask:
     for feet in ([0], [1], [0, 1]):
         here = known & np.isfinite(soles.outline[:, feet]).all(axis=(1, 2, 3)) & ~alone.any(axis=1)
         points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
-        alone[np.ix_(np.flatnonzero(here), np.array(feet))] |= (distance_to_hull(cop[here], points) < _UNDER)[:, None]
+        # 0.03 m: a centre of pressure so near to a sole is under it
+        alone[np.ix_(np.flatnonzero(here), np.array(feet))] |= (distance_to_hull(cop[here], points) < 0.03)[:, None]
     return alone
 
 
@@ -164,7 +162,6 @@ def distance_to_hull(point: Array, points: Array) -> Array:
 _SAME_LEVEL = 0.05  # m: heights closer than this are one surface
 _MARKER_HEIGHT = 0.20
 """m: a point of a sole that stands on a plate is at most this far above it (foot markers sit lower)."""
-_ASYMMETRY = 0.02  # m: the two feet's points may be this differently high above the ground
 _CARRIED = 0.9
 """Share of the body weight on the plates above which a foot that rests elsewhere is held in the air."""
 
@@ -246,17 +243,16 @@ def _offsets(trial: Trial, soles: Soles, rests: Mask, load: Mask) -> Array:
         found[:] = lowest - min(plate.height for plate in trial.plates)
     # A foot that never stood on a plate: as high as the other one.
     found = np.where(np.isnan(found), found[::-1], found)
-    return np.minimum(found, found[::-1] + _ASYMMETRY)
+    # 0.02 m: the two feet's points may be this differently high above the ground
+    return np.minimum(found, found[::-1] + 0.02)
 
 
 _RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""
 _REACH = 0.09
 """m: a foot within this height of a plate is over that plate and not over one of another step."""
-_HALF = 0.3  # Share of the sole that must be over a raised plate
 _BLOCK = 1024
 """Frames whose points all over the soles are looked at together: little memory, whatever the length."""
-_RAISED = 0.05  # m that a plate stands out of everything around it to count as raised
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,10 +294,12 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: Surfaces, touchin
         over = spread[index] & (np.abs(low - plate.height) < _REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over
-        if any(abs(height - plate.height) < _RAISED for height in surfaces.bare):
+        # 0.05 m that a plate stands out of everything around it to count as raised
+        if any(abs(height - plate.height) < 0.05 for height in surfaces.bare):
             raised &= ~over.any(axis=-1)
     share = anywhere.mean(axis=-1)
-    covered = (share == 1) | (raised & (share >= _HALF))
+    # Share of the sole that must be over a raised plate
+    covered = (share == 1) | (raised & (share >= 0.3))
     return Footing(on_plate, share, covered & ~unseen, unseen)
 
 
@@ -313,7 +311,13 @@ def _spread_over(plates: tuple[Plate, ...], soles: Soles, touching: Mask, load: 
     parts = []
     for start in range(0, soles.time.size, _BLOCK):
         part = slice(start, start + _BLOCK)
-        samples = _samples(soles.outline[part])
+        outline = soles.outline[part]
+        outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
+        length = np.linalg.norm(outwards, axis=-1, keepdims=True)
+        narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards
+        # Corners and the middles of all pairs: points all over a convex sole.
+        middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
+        samples = np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
         over = np.stack([inside(plate, samples) >= 0 for plate in plates])
         if standing is not None:
             over[unplaced] = standing[:, part, :, None] & ~np.isnan(samples[..., 0])
@@ -337,16 +341,6 @@ def _standing(pressed: Mask, load: Mask, touching: Mask) -> Mask:
                 nearest = here[np.abs(frames[:, None] - here).argmin(axis=1)]
                 found[:, frames, foot] |= sure[:, nearest, foot]
     return found
-
-
-def _samples(outline: Array) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim, from their ``outline`` (T, 2, P, 3) m."""
-    outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
-    length = np.linalg.norm(outwards, axis=-1, keepdims=True)
-    narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards
-    # Corners and the middles of all pairs: points all over a convex sole.
-    middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
-    return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 
 
 def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: Mask) -> Array:

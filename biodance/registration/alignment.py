@@ -167,7 +167,6 @@ _PRESSURE, _SHEAR, _VERTICAL = 0.02, 10.0, 25.0
 """m, N, N: by how much a body from tables misses the centre of pressure, the shear and the vertical force."""
 _OUTLIER = 12.0
 """Squared distance at which a sample counts half: three standard deviations of the four numbers together."""
-_ROUNDS = 4
 _STEP, _EVERY = 0.02, 0.04
 """s between two delays, and between two samples."""
 _LEAST = 0.4
@@ -203,7 +202,7 @@ class _Samples:
         """Return turn and shift (complex) and the loss (n,) of every sample."""
         # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
         weight = 1.0 / (1.0 + self.lift / _OUTLIER) ** 2
-        for _ in range(_ROUNDS):
+        for _ in range(4):
             centre, needed = (np.sum(weight * x) / weight.sum() for x in (self.cop, self.needed_cop))
             # the argument of sum conj(a) b is the turn that carries a onto b
             both = np.sum(weight * np.conj(self.cop - centre) * (self.needed_cop - needed)) / _PRESSURE**2

@@ -302,7 +302,6 @@ _PRESSED, _SLOW = 100.0, 0.3
 """N and m/s: a foot that stands on a plate."""
 _TENTH, _AROUND = 0.1, 0.1
 """Share of the weight, and s."""
-_ROUNDS = 3
 ENOUGH_ROWS = 300
 """Rows of the wrench (some two seconds) from which on it alone can judge."""
 HEIGHT_SD = 0.008
@@ -386,7 +385,7 @@ def refined(
     pose, why = start, ""
     # A prior of the change, centred at the present pose in every round: it damps, and holds what nobody sees.
     weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
-    for turn in range(_ROUNDS):
+    for turn in range(3):
         window, soles, about = _look(body, trial, motion, forces, pose)
         steps = plate_steps(window.trial, window.motion, _contact(body, window, soles), soles, forces, pose)
         feet, wrench = feet_pull(steps, about), None

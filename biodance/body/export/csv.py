@@ -35,7 +35,11 @@ def text(body: Body, source: str) -> str:
     sd = np.sqrt(np.diag(body.sip.covariance)).reshape(-1, 10)
     for i, name in enumerate(body.segments):
         phi, block = body.sip.of(name), slice(10 * i, 10 * i + 10)
-        spread = _derived_sd(phi, body.sip.covariance[block, block])
+        step = 1e-6 * np.maximum(np.abs(phi), 1e-6)
+        # First order: diagonal of D C D' with the slopes D by central differences.
+        steps = zip(np.diag(step), step, strict=True)
+        slope = np.stack([(_derived(phi + h) - _derived(phi - h)) / (2 * size) for h, size in steps], axis=1)
+        spread = np.sqrt(np.maximum(np.diag(slope @ body.sip.covariance[block, block] @ slope.T), 0.0))
         numbers = (*phi, *_derived(phi)), (*sd[i], *spread)
         for quantity, unit, value, deviation in zip((*STANDARD, *_DERIVED), _UNITS, *numbers, strict=True):
             frame = _COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else _JOINT_FRAME
@@ -47,13 +51,3 @@ def text(body: Body, source: str) -> str:
 def _derived(phi: Array) -> Array:
     lump = rigid_inertia(phi)
     return np.concatenate([lump.com, lump.inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
-
-
-def _derived_sd(phi: Array, covariance: Array) -> Array:
-    """Return (9,) standard deviations of the derived quantities, propagated by central differences."""
-    step = 1e-6 * np.maximum(np.abs(phi), 1e-6)
-    # First order: diagonal of D C D' with the slopes D by central differences.
-    slope = np.stack(
-        [(_derived(phi + h) - _derived(phi - h)) / (2 * s) for h, s in zip(np.diag(step), step, strict=True)], axis=1
-    )
-    return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))

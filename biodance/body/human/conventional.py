@@ -3,7 +3,7 @@ markers, frame by frame and without a body that follows them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,7 +37,8 @@ class _Leg:
 
 @dataclass(frozen=True, eq=False)
 class ConventionalModel:
-    """The conventional gait model of one person: ``sizes``, and both ``legs`` by side.
+    """The conventional gait model of one person: ``sizes``, and both ``legs`` by side; ``mark`` landmark -> (T, 3) m of
+    a trial (`of`).
 
     References
     ----------
@@ -46,15 +47,18 @@ class ConventionalModel:
 
     sizes: Measures
     legs: Mapping[str, _Leg]
+    mark: _Marks = field(default_factory=dict)
 
-    def angles(self, mark: _Marks, side: str, ahead: Array) -> dict[str, Array]:
+    def angles(self, side: str, ahead: Array, part: slice = slice(None)) -> dict[str, Array]:
         """Return the angles (T,) deg of a leg and of the pelvis by our names, NaN where a marker is not seen.
 
-        ``mark`` landmark -> (T, 3) m; ``ahead`` (2,) the axis of the laboratory along which the person walks. Pelvis
+        ``ahead`` (2,) the axis of the laboratory along which the person walks; ``part`` of the trial's frames. Pelvis
         and foot against the laboratory are told in the order tilt, obliquity, rotation, as plug-in gait does (Baker
         2001 and `cycles.curves.lab_curves` turn it round).
         """
-        pelvis, thigh, shank, ankle, foot = self._segments(mark, side)
+        pelvis, thigh, shank, ankle, foot = self._segments(
+            {name: track[part] for name, track in self.mark.items()}, side
+        )
         foot, sign, (x, y) = foot @ self.legs[side].foot, SIGN[side], ahead
         lab = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
         tilt, over, turn = zxy_angles(lab @ pelvis)
@@ -72,7 +76,7 @@ class ConventionalModel:
         }
         return {name: np.degrees(angle) for name, angle in found.items()}
 
-    def of(self, trial: Trial) -> "ConventionalTrial | None":
+    def of(self, trial: Trial) -> "ConventionalModel | None":
         """Return the model with the markers of a ``trial``; None where one that it needs is missing."""
         if trial.markers is None or not trial.marker_set:
             return None
@@ -80,7 +84,7 @@ class ConventionalModel:
         markers = canonical(trial.markers, marker_set)
         names = (*_PELVIS, *(name for side in SIDES for name in _of_leg(side)))
         found = {name: track for name in names if (track := landmark(markers, marker_set, name)) is not None}
-        return ConventionalTrial(self, found) if len(found) == len(names) else None
+        return replace(self, mark=found) if len(found) == len(names) else None
 
     def _segments(self, mark: _Marks, side: str) -> tuple[Array, ...]:
         """Return lab_R (T, 3, 3) of pelvis, thigh, shank with the knee's axis, shank with the ankle's, and foot as its
@@ -94,18 +98,6 @@ class ConventionalModel:
         thigh = frame_yz(hip - knee, SIGN[side] * (knee_at - knee))
         shank = frame_yz(knee - ankle, SIGN[side] * (ankle_at - ankle))
         return pelvis, thigh, shank @ elementary_rotation("y", leg.torsion), shank, _along(toe - ankle, shank)
-
-
-@dataclass(frozen=True, eq=False)
-class ConventionalTrial:
-    """The conventional gait ``model`` of a person and a trial's landmarks ``mark`` name -> (T, 3) m."""
-
-    model: ConventionalModel
-    mark: _Marks
-
-    def angles(self, side: str, ahead: Array, part: slice = slice(None)) -> dict[str, Array]:
-        """Return the angles deg of a leg in a ``part`` of the frames; see `ConventionalModel.angles`."""
-        return self.model.angles({name: track[part] for name, track in self.mark.items()}, side, ahead)
 
 
 def _along(forward: Array, shank: Array) -> Array:

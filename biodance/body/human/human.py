@@ -316,14 +316,14 @@ def _primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array
     return np.array([kind.mass * lump.mass, *(kind.com * length), *tensor])
 
 
-_COM_SIGMAS = 3.0  # Half width of a CoM box in prior standard deviations
 _LUMBAR_HEIGHT = 0.112 / 1.755
 """Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
     """Return where the CoM may be, (12, 2, 3) m: three standard deviations around the prior, inside the shape box."""
-    half = _COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
+    # Half width of a CoM box in prior standard deviations
+    half = 3.0 * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
     around = np.stack([sip.com - half, sip.com + half], axis=1)
     return np.clip(around, boxes[:, :1], boxes[:, 1:])
 

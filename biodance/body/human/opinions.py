@@ -84,17 +84,6 @@ _STEP = 0.01  # Of a girth: the step of a difference quotient
 
 
 @dataclass(frozen=True, eq=False)
-class _PartSolid:
-    """One part of a person: ``ratio`` of its volume to the mean person's, ``sd`` relative, of what the tape leaves
-    uncertain in it, ``said`` the girths it rests on.
-    """
-
-    ratio: float
-    sd: float
-    said: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class _SegmentOpinion:
     """One measurement of a segment: ``mass`` kg with ``mass_sd``, ``said`` the measures it rests on."""
 
@@ -140,8 +129,9 @@ def _opinion(
         if solid is None:
             one, sd = share * reference.segments[kind].mass * subject.mass, error_size("solid_mass", "untold part")
         else:
-            one, sd = share * mean * survey * solid.ratio, np.hypot(own, solid.sd)
-            said += tuple(name for name in solid.said if name not in said)
+            ratio, untold, girths_round = solid
+            one, sd = share * mean * survey * ratio, np.hypot(own, untold)
+            said += tuple(name for name in girths_round if name not in said)
         mass, variance = mass + one, variance + (one * sd) ** 2
     return _SegmentOpinion(mass, float(np.sqrt(variance)), said)
 
@@ -167,8 +157,10 @@ def _part_length(part: str, reference: Reference, sizes: Mapping[str, float]) ->
 
 def _part_solid(
     part: str, reference: Reference, subject: Subject, sizes: Mapping[str, float], girths: Mapping[str, float | None]
-) -> _PartSolid | None:
-    """Return a part's stacks; None where no girth of it was measured or no tape goes round it."""
+) -> tuple[float, float, tuple[str, ...]] | None:
+    """Return a part's volume over the mean person's, how unsure the tape leaves it (relative sd), and the girths that
+    were measured; None where none of it was, or no tape goes round it.
+    """
     table = read_table("human", "girths")
     rows = table.where(part=part)
     given = np.array([girths[row["girth"]] is not None for row in rows])
@@ -192,7 +184,7 @@ def _part_solid(
     # Errors of the tape through the prediction; of what no tape told, its own.
     covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)
     said = tuple(row["girth"] for row, is_given in zip(rows, given, strict=True) if is_given)
-    return _PartSolid(volume / mean, float(np.sqrt(slope @ covariance @ slope)), said)
+    return volume / mean, float(np.sqrt(slope @ covariance @ slope)), said
 
 
 def usual_outline(length: float, sex: Sex) -> FootSizes:

@@ -59,7 +59,13 @@ class _Upright:
 def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> StaticPosture:
     """Return the posture with the landmarks of shoulders and arms that have no marker, put where they usually are."""
     mark = dict(posture.landmarks)
-    upright = _upright(mark, lengths)
+    rotation, middle = pelvis_frame(mark["right_asis"], mark["left_asis"], mark["mid_psis"])
+    width = float(np.linalg.norm(mark["right_asis"] - mark["left_asis"]))
+    local = harrington_hip(width, float(np.linalg.norm(middle - mark["mid_psis"])))
+    right = unit(rotation[:, 2] * [1.0, 1.0, 0.0])
+    sizes = {f"{kind.removesuffix('_hand')}_length": lengths[kind] for kind in _ARM}
+    sizes["trunk_length"] = lengths["trunk_head"]
+    upright = _Upright(middle + rotation @ (local * [1.0, 1.0, 0.0]), np.cross(UP, right), right, sizes)
     unseen, notes = _trunk(mark, upright)
     hidden: list[str] = []
     for side in SIDES:
@@ -90,16 +96,6 @@ def _widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
         # First moments only: mass unchanged, its place unsure by m times the standard deviation.
         covariance[moments, moments] += (body.sip.mass[k] * error_size("unseen_com", kind)) ** 2
     return replace(body, sip=replace(body.sip, covariance=covariance))
-
-
-def _upright(mark: Mapping[str, Array], lengths: Mapping[str, float]) -> _Upright:
-    rotation, middle = pelvis_frame(mark["right_asis"], mark["left_asis"], mark["mid_psis"])
-    width = float(np.linalg.norm(mark["right_asis"] - mark["left_asis"]))
-    local = harrington_hip(width, float(np.linalg.norm(middle - mark["mid_psis"])))
-    right = unit(rotation[:, 2] * [1.0, 1.0, 0.0])
-    sizes = {f"{kind.removesuffix('_hand')}_length": lengths[kind] for kind in _ARM}
-    sizes["trunk_length"] = lengths["trunk_head"]
-    return _Upright(middle + rotation @ (local * [1.0, 1.0, 0.0]), np.cross(UP, right), right, sizes)
 
 
 def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[str]]:

@@ -18,8 +18,6 @@ from biodance.records import SIDES, Array
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-_ROUNDING = 1e-12  # m
-
 
 class _Section(NamedTuple):
     """The section of a body with a plane: ``area`` m², ``middle`` (3,) m its centroid."""
@@ -91,7 +89,7 @@ def _heights(triangles: Array, point: Array, normal: Array) -> Array:
     """Return the heights (n, 3) m of the corners over a plane (sums: a matrix product rounds by place)."""
     arm = triangles - point
     height = arm[..., 0] * normal[0] + arm[..., 1] * normal[1] + arm[..., 2] * normal[2]
-    return np.where(np.abs(height) < _ROUNDING, 0.0, height)
+    return np.where(np.abs(height) < 1e-12, 0.0, height)
 
 
 def _first(values: Array, marked: Array) -> Array:
@@ -208,7 +206,6 @@ def _turned(path: str, corners: Array, stature: float) -> _Scan:
 _UP = np.array([0.0, 1.0, 0.0])
 TO_NECK = 0.16
 """Of the stature: from the vertex down to the middle of the neck, where the density changes."""
-_APART = np.radians(8.0)  # Least angle between a straight arm and the vertical
 _TILTS, _STEEPEST = 8, np.radians(35.0)
 """Planes tried at a shoulder, up to this angle from the vertical."""
 _INSIDE, _PLACES = 0.04, 5
@@ -217,7 +214,6 @@ _SHOULDER = 0.013  # Of the stature squared: a larger section through a shoulder
 _THICK = 0.05
 """Of the stature: flesh farther from the arm's axis towards the body is no arm: a broad hip."""
 _REACH = 0.15  # Share by which shoulder to finger tips may differ from the skeleton's arm
-_HAND = 0.108  # Of the stature: wrist to finger tips (Winter 2009)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +329,17 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     way = tip - shoulder
     along = way / np.linalg.norm(way)
     angle = float(np.arctan2(sign * along[2], -along[1]))
-    _refuse_arm(side, skeleton, float(np.linalg.norm(way)), angle)
+    # 8.0 deg: Least angle between a straight arm and the vertical
+    if angle < np.radians(8.0):
+        raise SessionRefused(_touching(side, f"it hangs {np.degrees(angle):.0f} degrees from the vertical"))
+    reach = float(np.linalg.norm(way))
+    # Of the stature: wrist to finger tips (Winter 2009)
+    whole = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + 0.108 * skeleton.stature
+    if abs(reach / whole - 1) > _REACH:
+        raise SessionRefused(
+            f"[subject] scan: from the {side} shoulder to the farthest point sideways it is {reach:.2f} m, the "
+            f"person's arm is {whole:.2f} m long. Scan with straight arms, 30 degrees away from the trunk."
+        )
     tilts = np.linspace(0.0, min(0.8 * angle, _STEEPEST), _TILTS)
     places = shoulder - sign * np.linspace(0, _INSIDE * skeleton.stature, _PLACES)[:, None] * [0.0, 0.0, 1.0]
     # Normal between straight sideways and tilted up by at most the steepest plane.
@@ -351,17 +357,6 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     body = np.concatenate([body, hip])
     elbow = _joint(arm, shoulder + skeleton.lengths[f"{side}_upper_arm"] * along, -along)
     return arm, body, _Cut(shoulder, -plane, max(areas[best], 1e-4)), elbow
-
-
-def _refuse_arm(side: str, skeleton: Skeleton, reach: float, angle: float) -> None:
-    arm = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + _HAND * skeleton.stature
-    if angle < _APART:
-        raise SessionRefused(_touching(side, f"it hangs {np.degrees(angle):.0f} degrees from the vertical"))
-    if abs(reach / arm - 1) > _REACH:
-        raise SessionRefused(
-            f"[subject] scan: from the {side} shoulder to the farthest point sideways it is {reach:.2f} m, the "
-            f"person's arm is {arm:.2f} m long. Scan with straight arms, 30 degrees away from the trunk."
-        )
 
 
 def _touching(side: str, why: str) -> str:

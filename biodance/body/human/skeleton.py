@@ -276,8 +276,6 @@ OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
 _ACROMION = 0.5
 """Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
-_BEYOND_WRIST = 0.03  # m: markers of the forearm so far beyond the wrist are worn on the hand
-_HEAD_MARKERS = 3
 
 
 def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
@@ -287,12 +285,22 @@ def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str
     ``landmarks`` of its marker set: which labels mark the wrists.
     """
     if name == "neck":
-        return _with_neck(body)
+        places = neck_and_vertex(body)
+        if places is None:
+            return body
+        neck, vertex = places
+        seen = _worn(body, "trunk_head", body.markers.position[:, 1] > neck[1])
+        if len(seen) < 3:
+            return body
+        head = share_of_body(body, "head", top=vertex, bottom=neck)
+        return _ranged(with_part(body, Cut("trunk_head", "head", _axes("neck"), neck, head, seen)))
     for side in SIDES:
         if name == "clavicles":
             body = _with_clavicle(body, side)
         elif name == "forearms":
-            body = _with_pronation(body, side, landmarks)
+            if _wrist(body, side, landmarks) is not None:
+                ((axis_name, axis),) = _axes("elbow", side).items()
+                body = _ranged(with_axis(body, f"{side}_elbow_flexion", axis_name, axis))
         else:
             body = _with_wrist(body, side, landmarks)
     return body
@@ -345,18 +353,6 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
     return inertial_parameters(RigidInertia(mass, top + place * (bottom - top), inertia))
 
 
-def _with_neck(body: Body) -> Body:
-    places = neck_and_vertex(body)
-    if places is None:
-        return body
-    neck, vertex = places
-    seen = _worn(body, "trunk_head", body.markers.position[:, 1] > neck[1])
-    if len(seen) < _HEAD_MARKERS:
-        return body
-    head = share_of_body(body, "head", top=vertex, bottom=neck)
-    return _ranged(with_part(body, Cut("trunk_head", "head", _axes("neck"), neck, head, seen)))
-
-
 def _with_clavicle(body: Body, side: str) -> Body:
     if shoulders(body) is None:
         return body
@@ -371,18 +367,12 @@ def _with_clavicle(body: Body, side: str) -> Body:
     return _ranged(with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), seen, (shoulder,))))
 
 
-def _with_pronation(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
-    if _wrist(body, side, landmarks) is None:
-        return body
-    ((name, axis),) = _axes("elbow", side).items()
-    return _ranged(with_axis(body, f"{side}_elbow_flexion", name, axis))
-
-
 def _with_wrist(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
     wrist, segment = _wrist(body, side, landmarks), f"{side}_forearm_hand"
     if wrist is None:
         return body
-    seen = _worn(body, segment, body.markers.position[:, 1] < wrist[1] - _BEYOND_WRIST)
+    # 0.03 m: markers of the forearm so far beyond the wrist are worn on the hand
+    seen = _worn(body, segment, body.markers.position[:, 1] < wrist[1] - 0.03)
     if not seen:
         return body
     table = read_segment_table("de_leva_1996")

@@ -243,14 +243,15 @@ def segment_frames(centres: Centres) -> SegmentFrames:
             (("thigh", "shank"), ("hip", "knee", "ankle")),
             (("upper_arm", "forearm_hand"), ("shoulder", "elbow", "wrist")),
         ):
-            limb = (f"{side}_{names[0]}", f"{side}_{names[1]}")
-            _chain(
-                rotation,
-                origin,
-                limb,
-                tuple(at[f"{side}_{joint}"] for joint in joints),
-                centres.right[f"{side}_{joints[1]}"],
-            )
+            upper, lower = (f"{side}_{name}" for name in names)
+            top, middle, end = (at[f"{side}_{joint}"] for joint in joints)
+            origin[upper], origin[lower] = top, middle
+            # The second segment flexes about z of the first, tilted about its own x (varus).
+            rotation[upper] = frame_yz(top - middle, centres.right[f"{side}_{joints[1]}"])
+            direction = rotation[upper].T @ measures.unit(middle - end)
+            # y of the lower segment: Rz(f) Rx(v) e_y = (-sin f cos v, cos f cos v, sin v).
+            flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
+            rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
         rotation[f"{side}_foot"] = frame_yz(centres.sole.get(side, UP), centres.across[side])
     ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
@@ -262,19 +263,3 @@ def frame_yz(up: Array, right: Array) -> Array:
     y = measures.unit(up)
     x = measures.unit(np.cross(y, right))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
-
-
-def _chain(
-    rotation: dict[str, Array],
-    origin: dict[str, Array],
-    names: tuple[str, str],
-    centres: tuple[Array, ...],
-    right: Array,
-) -> None:
-    """Fill in the two segments of a limb: the second flexes about z of the first, tilted about its own x (varus)."""
-    (upper, lower), (top, middle, end) = names, centres
-    rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
-    direction = rotation[upper].T @ measures.unit(middle - end)
-    # y of the lower segment: Rz(f) Rx(v) e_y = (-sin f cos v, cos f cos v, sin v).
-    flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
-    rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)

@@ -139,7 +139,6 @@ _SPELLINGS = {
     **{unit: unit for unit in _METRES},
     **dict.fromkeys(("inch", "inches"), "in"),
 }
-_PLATE = 0.6  # m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
 
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
 _BELIEVABLE = (0.05, 4.75)
@@ -189,7 +188,8 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     if corners.size >= 12 and np.isfinite(corners).all():
         longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
         if 0 < longest < math.inf:
-            return longest, _PLATE, "a plate side"
+            # 0.6 m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
+            return longest, 0.6, "a plate side"
     return math.nan, PERSON_SPAN, ""
 
 
@@ -244,15 +244,13 @@ class RawC3d:
     ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of
     the first frame; ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``;
     ``analog_rate`` Hz, NaN = none; ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper
-    case): arrays with the file's own dimensions, first dimension fastest, or lists of stripped strings. ``reader``
-    names who agrees on the numbers, "biodance" or "biodance, ezc3d"; ``warnings`` say where the file contradicts itself
-    or smells of a misread, and how that was decided, ``history`` what was decided without doubt; ``layout`` says how
-    the numbers were stored (None = by no file).
+    case): arrays with the file's own dimensions, first dimension fastest, or lists of stripped strings.
+    ``warnings`` say where the file contradicts itself or smells of a misread, and how that was decided, ``history``
+    what was decided without doubt; ``layout`` says how the numbers were stored (None = by no file).
     """
 
     path: Path
     sha256: str
-    reader: str
     labels: tuple[str, ...]
     points: NDArray[Any]
     rate: float
@@ -295,13 +293,12 @@ def read_raw(path: str | Path) -> RawC3d:
     content, parameters, layout, history = open_c3d(path)
     points, analog = numbers = read_numbers(content, layout)
     labels = point_labels(parameters, layout)
-    smells, reader = _smells(numbers, labels, layout, parameters, path)
+    smells = _smells(numbers, labels, layout, parameters, path)
     for values in numbers:
         values.setflags(write=False)
     return RawC3d(
         path=path,
         sha256=hashlib.sha256(content).hexdigest(),
-        reader=reader,
         labels=labels,
         points=points,
         rate=layout.rate,
@@ -364,8 +361,8 @@ def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:
 
 def _smells(
     numbers: _Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
-) -> tuple[tuple[str, ...], str]:
-    """Have suspicious numbers judged by a second reader; return its judgement and who agrees, or refuse."""
+) -> tuple[str, ...]:
+    """Have suspicious numbers judged by a second reader; return its judgement, or refuse."""
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     markers = [column for column in range(layout.points) if column not in no_markers]
     points, leaps = numbers[0], 0
@@ -375,7 +372,7 @@ def _smells(
             step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
             leaps += int(np.count_nonzero(any_coordinate(step > _LEAP * metre)))
     if not leaps and not layout.notes:
-        return (), "biodance"
+        return ()
     opinion = second_opinion(path, numbers, layout)
     jump = f"Markers jump by more than {_LEAP:g} m between two frames in {leaps} places"
     smell = jump if leaps else "Header and parameters disagree"
@@ -384,8 +381,8 @@ def _smells(
             f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}"
         )
     if opinion == "confirmed":
-        return (f"{smell}; ezc3d finds the same numbers.",), "biodance, ezc3d"
-    return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
+        return (f"{smell}; ezc3d finds the same numbers.",)
+    return (f"{smell}; {opinion}, so only biodance has read these numbers.",)
 
 
 def _fit(names: list[str], count: int) -> tuple[str, ...]:

@@ -21,7 +21,6 @@ from biodance.lab.plain_text import refuse_present, write_whole
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, assign, frozen_array
 
-_PATIENCE = 300.0  # s after which the child is given up
 _NEAR = 0.1  # s: an event that the file has already within this time is not written again
 _Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
 _UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
@@ -148,7 +147,8 @@ def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
     """Have the child write the copy; whatever goes wrong in it refuses the file."""
     words, asked = ("-m", "biodance.lab.c3d.results", str(original), str(made)), json.dumps(question).encode()
     try:
-        child = run_python(*words, input=asked, timeout=_PATIENCE)
+        # 300.0 s after which the child is given up
+        child = run_python(*words, input=asked, timeout=300.0)
     except (subprocess.TimeoutExpired, OSError) as error:
         raise FileRefused(
             f"{original}: ezc3d gives no copy of it ({error}). Export the trial again from the recording software."

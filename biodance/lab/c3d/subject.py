@@ -124,13 +124,12 @@ _WORDS = {"foot strike": True, "foot off": False, "toe off": False, "heel strike
 
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time from the first frame; ``program`` that wrote
-    them, or ""; what the muscles did (``emg``).
+    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time from the first frame; what the muscles did
+    (``emg``).
     """
 
     angles: Mapping[str, Array]
     events: tuple[FootEvent, ...]
-    program: str = ""
     emg: tuple[EmgEnvelope, ...] = ()
 
 
@@ -160,8 +159,7 @@ def read_outputs(path: str | Path) -> FileOutputs:
         for name, column in columns.items():
             value = degrees * points[:, column]
             angles[name] = np.where((value != 0).any(axis=1)[:, None], value, np.nan)
-    said = [*texts(parameters, "MANUFACTURER", "SOFTWARE"), *texts(parameters, "MANUFACTURER", "COMPANY")]
-    return FileOutputs(angles, _events(parameters, layout), " ".join(said[:1]), emg)
+    return FileOutputs(angles, _events(parameters, layout), emg)
 
 
 def _events(parameters: Parameters, layout: Layout) -> tuple[FootEvent, ...]:

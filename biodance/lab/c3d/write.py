@@ -77,15 +77,14 @@ def write_c3d(
     analog_rate: float = 0.0,
     parameters: _FileParameters | None = None,
     first_frame: int = 1,
-    prefix: str = "",
 ) -> None:
     """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that all readers give back to float32
     precision.
 
     ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame
-    has no rate of its own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
-    (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass
-    kg, Height mm), and overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
+    has no rate of its own: it takes ``analog_rate`` over its samples. ``parameters[GROUP][NAME]`` are added as they
+    stand, in the units of the file (PROCESSING: Bodymass kg, Height mm), and overrule what this function would write,
+    for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
 
     Raises
     ------
@@ -106,7 +105,7 @@ def write_c3d(
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"{path}: the rate would be {rate:g} Hz; give analog_rate > 0.")
     groups: dict[str, dict[str, FileValue]] = {
-        "POINT": _point_group(markers, prefix, rate, len(points)),
+        "POINT": _point_group(markers, rate, len(points)),
         "ANALOG": _analog_group(plates, rate * samples),
         "FORCE_PLATFORM": _plate_group(plates),
         "TRIAL": {"ACTUAL_START_FIELD": _words(first_frame), "ACTUAL_END_FIELD": _words(first_frame + len(points) - 1)},
@@ -159,8 +158,8 @@ def _words(number: int) -> Array:
     return np.array([number % 65536, number // 65536]).astype(np.uint16).astype(np.int16)  # type: ignore[return-value]
 
 
-def _point_group(markers: Markers | None, prefix: str, rate: float, frames: int) -> dict[str, FileValue]:
-    labels = [prefix + name for name in markers.names] if markers is not None else []
+def _point_group(markers: Markers | None, rate: float, frames: int) -> dict[str, FileValue]:
+    labels = list(markers.names) if markers is not None else []
     clipped = int(np.uint16(min(frames, 65535)).astype(np.int16))
     return {
         "USED": len(labels),

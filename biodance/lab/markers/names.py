@@ -116,28 +116,6 @@ def _sided(given: tuple[str, ...], word: str, side: str, pair: tuple[str, str]) 
     return out
 
 
-def _readings_of(
-    labels: Iterable[str], pairs: Sequence[tuple[str, str]], noise: frozenset[str]
-) -> dict[str, tuple[_Spelled, ...]]:
-    """Return label -> its readings as this set writes its sides: the way that makes most mirror images first."""
-    every = {label: readings(name, pairs, noise) for label, name in plain_labels(labels).items()}
-    out: dict[str, tuple[_Spelled, ...]] = {}
-    ways: list[tuple[str, str, str]] = []
-    while True:
-        left = {label: found for label, found in every.items() if label not in out}
-        mirrored = _mirrored(left)
-        if not mirrored:
-            break
-        way = max(mirrored, key=lambda one: (len(mirrored[one]), one[0] == "first", len(one[1])))
-        if len(mirrored[way]) < 2 * _PAIRS and ways:
-            break
-        ways.append(way)
-        out |= {label: tuple(one for one in every[label] if one.way == way) for label in mirrored[way]}
-    for label in every.keys() - out.keys():
-        out[label] = tuple(one for one in every[label] if not one.side or not ways or one.way in ways)
-    return {label: out[label] for label in every}
-
-
 def side_words(mirrored: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     """Return the pairs of words (right, left) by which the labels of mirror images (right, left) differ, the most usual
     first: what this laboratory says for right and left, in whatever language.
@@ -265,7 +243,23 @@ def joints_from_video(labels: Iterable[str]) -> tuple[str, ...]:
 def _read(labels: tuple[str, ...], sides: tuple[tuple[str, str], ...] = ()) -> Mapping[str, tuple[_Spelled, ...]]:
     """Return label -> its readings as the whole set of labels is written."""
     words = _vocabulary()
-    return _readings_of(labels, tuple(dict.fromkeys((*sides, *words.pairs))), words.noise)
+    pairs = tuple(dict.fromkeys((*sides, *words.pairs)))
+    every = {label: readings(name, pairs, words.noise) for label, name in plain_labels(labels).items()}
+    out: dict[str, tuple[_Spelled, ...]] = {}
+    ways: list[tuple[str, str, str]] = []
+    while True:  # the way to write sides that makes most mirror images first
+        left = {label: found for label, found in every.items() if label not in out}
+        mirrored = _mirrored(left)
+        if not mirrored:
+            break
+        way = max(mirrored, key=lambda one: (len(mirrored[one]), one[0] == "first", len(one[1])))
+        if len(mirrored[way]) < 2 * _PAIRS and ways:
+            break
+        ways.append(way)
+        out |= {label: tuple(one for one in every[label] if one.way == way) for label in mirrored[way]}
+    for label in every.keys() - out.keys():
+        out[label] = tuple(one for one in every[label] if not one.side or not ways or one.way in ways)
+    return {label: out[label] for label in every}
 
 
 def _meanings(ways: Iterable[_Spelled]) -> tuple[Meaning, ...]:

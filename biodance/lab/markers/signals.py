@@ -22,7 +22,6 @@ than somebody who stands for the static trial sways in that time.
 """
 _SLOWER = 0.5
 """Share of the step before it from which on a marker does not come to rest by and by, as computed movement does."""
-_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
 _LONGEST = 3  # Frames of a spike at most; what lasts longer may be another marker
 _OFF = 0.03
 """m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after
@@ -170,7 +169,8 @@ def _breaks_off(steps: Array, start: int, stop: int) -> bool:
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
         if min(near, far) >= 0 and max(near, far) < steps.size:
             slower_yet = not 0 <= farther < steps.size or steps[far] < steps[farther]
-            if steps[near] > _FELT and not (steps[near] < _SLOWER * steps[far] and slower_yet):
+            # 1e-5 m: smaller steps are the last digits of a computed movement
+            if steps[near] > 1e-5 and not (steps[near] < _SLOWER * steps[far] and slower_yet):
                 return True
     return False
 
@@ -240,7 +240,6 @@ _FLANK = 6  # Seen frames that each side of a short gap must have
 _CARRIERS = 5  # At most so many neighbours carry a marker across a gap; at least three are needed
 _RIGID = 0.01
 """m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
-_OFF_LINE = 0.01  # m: so far from one line the neighbours must lie to fix a rotation
 _CLOSURE = 0.02
 """m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
 
@@ -383,4 +382,5 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
     points = np.stack([markers[label][gap.start - 1] for label in rigid])
     # Second singular value: spread beside the best line; on a line the turn about it is not told.
     from_a_line = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]
-    return rigid if from_a_line > _OFF_LINE else []
+    # 0.01 m: so far from one line the neighbours must lie to fix a rotation
+    return rigid if from_a_line > 0.01 else []

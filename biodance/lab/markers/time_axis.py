@@ -17,7 +17,6 @@ _ROUNDED = 0.2
 """Share of a step by which a stamp may lie off equal steps: writers round the time column."""
 _HOLE = 2.5
 """Steps between two stamps from which on nothing is told between them: one row is missing at two."""
-_DRAWN = 16
 LONGEST_STEP = 0.2
 """s: rows farther apart are postures. Below 5 Hz a movement of 2 Hz, the fastest that a person repeats with the whole
 body, cannot be told (Nyquist).
@@ -64,7 +63,7 @@ class TimeAxis:
     def noise(self) -> float:
         """Factor on the standard deviation of white noise, as drawn noise (fixed seed, known to 1 %) comes out."""
         # The interpolation is linear: its effect on white noise is a factor.
-        drawn = np.random.default_rng(0).normal(size=(self.stamps.size, _DRAWN))
+        drawn = np.random.default_rng(0).normal(size=(self.stamps.size, 16))
         return float(np.nanstd(self.at(drawn)))
 
     def missed_by(self, values: Array) -> float:
@@ -147,9 +146,6 @@ _SLOW = 0.375
 _STILL = 0.01  # Of the mean squared speed: rows that are slower tell nothing of their instants
 _HIGHEST = 500.0  # Hz of cameras that are looked for
 _TICK = 0.25 / _HIGHEST  # s to which instants are rounded where rates are tried
-_FINE = 16  # Rates tried per cycle that a recording holds more
-_CHANCE = 1e-6  # That stamps without a grid gather as much at any rate
-_FEWEST = 100  # Rows without which nothing is looked for
 
 
 def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
@@ -160,7 +156,8 @@ def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
     edges = [0, *holes.tolist(), stamps.size]
     longest = int(np.argmax(np.diff(edges)))
     rows = slice(edges[longest], edges[longest + 1])
-    paths = _paths(xyz[rows]) if time_axis(stamps, where="").sampled and rows.stop - rows.start >= _FEWEST else None
+    # Rows without which nothing is looked for
+    paths = _paths(xyz[rows]) if time_axis(stamps, where="").sampled and rows.stop - rows.start >= 100 else None
     grid = None if paths is None else _on_grid(stamps[rows], paths)
     if grid is None:
         return stamps, ""
@@ -228,7 +225,8 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     share = weight / weight.sum()
     places = np.rint((instants - instants[0]) / _TICK).astype(int)
     # Zeros behind: rates are tried more finely than one cycle in the whole recording.
-    count = next_fast_len(_FINE * (int(places[-1]) + 1), real=True)
+    # Rates tried per cycle that a recording holds more
+    count = next_fast_len(16 * (int(places[-1]) + 1), real=True)
     # Sum of share exp(-i w t): large where all instants lie on a grid of that rate.
     gathered = np.fft.rfft(np.bincount(places, share), count)
     tried = np.arange(gathered.size) / (count * _TICK)
@@ -236,7 +234,8 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     best = legal[int(np.argmax(np.abs(gathered[legal])))]
     # |sum of share exp(i phase)|² of random phases is exponential with the mean sum(share²); so many rates were tried
     chance = legal.size * np.exp(-(np.abs(gathered[best]) ** 2) / np.sum(share**2))
-    if chance > _CHANCE:
+    # That stamps without a grid gather as much at any rate
+    if chance > 1e-6:
         return None
     frequency = float(tried[best])
     # exp(-i w t0): the phase tells the first instant.

@@ -19,7 +19,6 @@ from biodance.settings import STANDARD_GRAVITY, StandingRules
 
 WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
-_UNSEEN = 0.1  # m a frame: an unseen marker counts as one that moves so fast
 _STILL = 0.02  # m, standard deviation over half a second beyond which a marker does not stand still
 _BLOCK = 0.05  # s: the force is averaged over blocks of this length before it is judged
 _MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
@@ -92,7 +91,8 @@ def _quietest(markers: Markers) -> Mask:
         return np.ones(frames, dtype=bool)
     step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
     unseen = np.isnan(step)
-    cost = np.where(unseen, _UNSEEN, step).sum(axis=1)
+    # 0.1 m a frame: an unseen marker counts as one that moves so fast
+    cost = np.where(unseen, 0.1, step).sum(axis=1)
     # Sliding sum: a window of `length` frames holds one step less.
     total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
     start = int(np.argmin(total))

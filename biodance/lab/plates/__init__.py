@@ -62,7 +62,6 @@ PLATE_TYPES = {
     7: plate_type(*_EIGHT, inputs=8),
 }
 """The TYPEs of the C3D standard that can be computed."""
-_USUAL_TYPE = 2  # Three forces and three moments: taken for channels of which nothing else is said
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 _AROUND_NAMES = re.compile(r"force|moment|torque|[\s._+:-]", flags=re.IGNORECASE)
@@ -251,7 +250,8 @@ def plate_parameters(
     """
     told, group = told or NOTHING_TOLD, raw.parameters.get("FORCE_PLATFORM", {})
     described = _numbers(group, "TYPE").size >= number
-    kind = told.type or (int(_of_plate(group, "TYPE", (), number)) if described or not told.channels else _USUAL_TYPE)
+    # Three forces and three moments: taken for channels of which nothing else is said
+    kind = told.type or (int(_of_plate(group, "TYPE", (), number)) if described or not told.channels else 2)
     if kind not in PLATE_TYPES:
         known = ", ".join(map(str, PLATE_TYPES))
         what = f" ({_NAMES_OF_TYPE[kind]})" if kind in _NAMES_OF_TYPE else ""

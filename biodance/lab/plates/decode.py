@@ -31,12 +31,10 @@ LARGEST_SHARE = 1 / 3  # an offset of the sign of a load must stay below this sh
 _SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
 _DEAD, _LONG = 1.5, 0.5
 """N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
-_FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 _NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
-_UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 _SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
 _UNITS = {"m": 1.0, "mm": 0.001}
@@ -184,7 +182,8 @@ def find_baseline(vertical: Array, *, zero: tuple[int, int] | None, rate: float)
     or plainly no load.
     """
     written, why = _written(vertical, zero)
-    if written and written.stop - written.start >= _FEW:
+    # 10 samples: a shorter ZERO is only used where nothing better is found
+    if written and written.stop - written.start >= 10:
         return written
     found = _longest_unloaded(vertical, rate)
     if found is not None:
@@ -338,7 +337,13 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     # Points are rows: R p becomes p R'.
     lab = corners @ turn.T * unit
     _refuse_disorder(lab)
-    _refuse_size(lab, corners)
+    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
+    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
+        raise TrialRefused(
+            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
+            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
+            "POINT:UNITS."
+        )
     gap, skew = _gap(lab), _skew(lab)
     if gap > _NOT_CLOSED or skew > _NOT_CLOSED:
         raise TrialRefused(
@@ -367,7 +372,8 @@ def is_rectangle(corners: Array) -> bool:
     # In any unit: as far apart as the sides of plates can be, and opposite ones against each other.
     if not lengths.min() * LONGEST_SIDE > SHORTEST_SIDE * lengths.max() > 0 or sides[0] @ sides[2] >= 0:
         return False
-    return max(_gap(corners), _skew(corners)) < _UNEVEN * float(lengths.min())
+    # Share of the shortest side by which a rectangle may miss its closure
+    return max(_gap(corners), _skew(corners)) < 0.1 * float(lengths.min())
 
 
 def plate_axes(corners: Array) -> Array:
@@ -436,16 +442,6 @@ def _refuse_disorder(lab: Array) -> None:
         f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the "
         "corners in the order +x+y, -x+y, -x-y, +x-y of the plate axes."
     )
-
-
-def _refuse_size(lab: Array, corners: Array) -> None:
-    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
-    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
-        raise TrialRefused(
-            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
-            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
-            "POINT:UNITS."
-        )
 
 
 def _gap(corners: Array) -> float:

@@ -38,10 +38,7 @@ from biodance.records.attention import Doubt, WrongWeight
 from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE, CheckLimits, StandingRules
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
-_AROUND = 0.05  # m by which a sole reaches beyond its markers
-
 _STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
-_SAME_PLACE = 0.001  # m: standard deviation of a centre of pressure that nobody moves
 _QUIET = 2.5
 """N: largest standard deviation of what an empty plate reads, half the spread up to which `decode` calls one quiet; a
 foot that comes or goes changes it by far more.
@@ -59,7 +56,6 @@ _SCALE_OFF = 0.5
 """Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
 _SCALE_RIGHT = 0.15
 """Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
-_SOMEBODY_ON = 0.3  # share of the largest total force from which on somebody stands on the plates
 
 
 def decode_plates(
@@ -115,7 +111,8 @@ def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
     """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
     total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
     # Somebody stands there, at a share of the largest total.
-    loaded = total >= _SOMEBODY_ON * total.max()
+    # Share of the largest total force from which on somebody stands on the plates
+    loaded = total >= 0.3 * total.max()
     return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
 
 
@@ -144,7 +141,8 @@ def _feet_on(reading: PlateReading, markers: Markers) -> bool:
     # Component along each axis of the plate.
     x, y, _ = (reading.axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
     low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= FOOT_HEIGHT
-    half = reading.half + _AROUND
+    # 0.05 m by which a sole reaches beyond its markers
+    half = reading.half + 0.05
     return bool((low & (np.abs(x) <= half[0]) & (np.abs(y) <= half[1])).any())
 
 
@@ -164,7 +162,8 @@ def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) 
     length = _CONTACT if elsewhere else 0.0  # noise is averaged only where feet tell that nobody is on the plate
     level, spread, wanders = _course(reading, length)
     # Shares of the level: noise of a load grows with it, and moments over it are places.
-    still = spread < _STUCK * abs(level) and wanders < _SAME_PLACE * abs(level)
+    # 0.001 m: standard deviation of a centre of pressure that nobody moves
+    still = spread < _STUCK * abs(level) and wanders < 0.001 * abs(level)
     if markers is None or abs(level) <= TOUCH_FORCE or not still:
         return ""
     if not (elsewhere or movement(markers) > StandingRules.still):
@@ -231,9 +230,6 @@ def _moves(markers: Markers | None, start: float, stop: float) -> bool:
     return bool((np.diff(some, axis=0) != 0)[np.isfinite(np.diff(some, axis=0))].any())
 
 
-_AS_POUNDS = 0.03  # share by which a ratio of weights may differ from newton per pound
-
-
 class PlatesRead(NamedTuple):
     """The plates of one recording, what a person should look at, what was decided without doubt, what was left out."""
 
@@ -291,7 +287,8 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
     for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):
-        if abs(mass / body_mass / factor - 1) <= _AS_POUNDS:
+        # Share by which a ratio of weights may differ from newton per pound
+        if abs(mass / body_mass / factor - 1) <= 0.03:
             return (f"{said}: the ratio is that of {meaning}. Check ANALOG:UNITS.",)
     return (WrongWeight(f"{said}: check the mass, the units, and whether a foot stood beside the plates."),)
 

@@ -17,7 +17,6 @@ from biodance.spatial import wrench_about_origin, wrench_about_point, zero_momen
 _Said = tuple[str, ...]
 
 _INSIDE = 0.8  # share of the loaded samples that must lie on the plate
-_STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
 _LEAST_BESIDE = 0.02  # m: sensors so near to the middle of the surface cannot be told to lie on its other side
 _STRONGEST = 30e3  # N, N·m: beyond the range of every maker's plate
 _MOMENT_UNITS = (1.0, 1000.0, 0.001)
@@ -27,11 +26,8 @@ _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 _QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0), (0, -1))]
 """Rotations about z by 90, 180 and 270 degrees."""
 
-_BESIDE = 0.15  # m beyond the edge
 _THROUGHOUT = 0.8
 """Share of the loads that lie under the feet where the axes are right, edges of steps left aside."""
-_OVER_THE_EDGE = 0.05  # m beyond the edge: markers of a foot that stands on the plate
-_FRAMES = 200
 _UNDER_THE_FOOT, _NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
 _HANGING = 0.09
 """m over the plate: of a foot that stands there is a lower marker, at the ankle if at nothing else; who sits on the
@@ -39,8 +35,6 @@ plate lets them hang higher.
 """
 
 _SWAY_BAND = (0.5, 5.0)  # Hz
-_SWAY_TIME = 2.5  # s of standing that the sway test needs
-_SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
 _SWAY_CORRELATION = 0.4
 _SWAY_SLOPE = (0.25, 3.0)
 """1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass."""
@@ -149,7 +143,8 @@ def _with_moments_in_unit(reading: PlateReading, loaded: Mask) -> PlateReading:
         tried = pressed * np.array([1, 1, 1, factor, factor, factor])
         share = _share_on_plate(replace(reading, sensor=tried))
         # moments that are 1000 times too small lie on every plate: at its centre, where nobody's pressure stays
-        lives = float(np.percentile(np.abs(zero_moment_point(tried, threshold=COP_FORCE)).max(axis=1), 90)) > _STILLEST
+        # 0.0015 m: nobody's centre of pressure stays this close to the plate's centre
+        lives = float(np.percentile(np.abs(zero_moment_point(tried, threshold=COP_FORCE)).max(axis=1), 90)) > 0.0015
         if share >= _INSIDE and lives:
             good.append(factor)
         if factor == 1.0:
@@ -235,10 +230,12 @@ def _standing(vertical: Array, rate: float) -> slice | None:
     if size < 4 or abs(middle) < 5 * TOUCH_FORCE:
         return None
     blocks = vertical[: vertical.size // size * size].reshape(-1, size)
-    most = _SWAY_STEADY * abs(middle)
+    # Share of the weight by which the vertical force may vary
+    most = 0.05 * abs(middle)
     steady = (np.abs(blocks.mean(axis=1) - middle) <= most) & (blocks.std(axis=1) <= most)
     start, stop = longest_run(steady)
-    return slice(start * size, stop * size) if (stop - start) * size >= _SWAY_TIME * rate else None
+    # 2.5 s of standing that the sway test needs
+    return slice(start * size, stop * size) if (stop - start) * size >= 2.5 * rate else None
 
 
 def _band(values: Array, rate: float) -> Array:
@@ -444,16 +441,18 @@ def _distance(reading: PlateReading, time: Array, markers: Markers, *, throughou
     """
     if not markers.time.size:
         return None
-    frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
+    frames = np.unique(np.linspace(0, markers.time.size - 1, 200).round().astype(int))
     at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
     point = pressure_point(replace(reading, sensor=reading.sensor[at]))[:, :2]
-    centre, reach = reading.corners.mean(axis=0), float(np.linalg.norm(reading.half)) + _BESIDE
+    # 0.15 m beyond the edge
+    centre, reach = reading.corners.mean(axis=0), float(np.linalg.norm(reading.half)) + 0.15
     cop, xyz = centre[:2] + point @ reading.axes[:2, :2].T, markers.xyz[frames]
     low = np.abs(xyz[:, :, 2] - centre[2]) <= FOOT_HEIGHT
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
     if throughout:
         # Rows are vectors: v @ axes is axes'v, in the plate's axes.
-        near &= (np.abs(((xyz - centre) @ reading.axes)[..., :2]) <= reading.half + _OVER_THE_EDGE).all(axis=2)
+        # 0.05 m beyond the edge: markers of a foot that stands on the plate
+        near &= (np.abs(((xyz - centre) @ reading.axes)[..., :2]) <= reading.half + 0.05).all(axis=2)
     seen = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
     if seen.sum() < max(1, min(5, len(cop))):
         return None

@@ -81,7 +81,6 @@ def head_text(head: bytes) -> str:
 
 
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
-_HEAD = 8192  # Bytes of a file that are looked at to find its reader
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
@@ -124,7 +123,8 @@ def read_head(path: Path) -> bytes:
     """
     if path.is_dir():
         raise FileRefused(f"{path}: is a folder, a file is expected. Point at one recording.")
-    return read_bytes(path, most=_HEAD)
+    # Bytes of a file that are looked at to find its reader
+    return read_bytes(path, most=8192)
 
 
 def sniffed(path: Path, head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:

@@ -35,7 +35,6 @@ def sniff(head: bytes) -> bool:
 
 
 _KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
-_CHANNELS = 6
 _EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
 
 
@@ -68,7 +67,7 @@ def _table(text: str, path: Path) -> tuple[list[str], Array]:
     for line in lines:
         first = _cells(line)
         # All numbers of a row but one are a damaged row and no header.
-        if first and sum(_numbers([cell]) is not None for cell in first) >= min(_CHANNELS - 1, len(first)):
+        if first and sum(_numbers([cell]) is not None for cell in first) >= min(6 - 1, len(first)):
             break
         header, first, begin = first or header, [], begin + 1
     # Commas and semicolons part cells as tabs do.

@@ -47,7 +47,6 @@ INSTRUMENT = _layout(
 )
 _SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
 _IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
-_MICROVOLT = 1e6
 _MOST_PLATES, _MOST_CHANNELS, _FASTEST = 16, 32, 100_000
 
 
@@ -63,7 +62,7 @@ def _load(block: NDArray[Any], header: Any, version: int, where: str) -> Array:
                 f"NetForce and save again."
             )
         # Counts over counts a volt and gain: volts of the bridge; the sensitivity is µV per volt of excitation a unit.
-        factor = _MICROVOLT / product
+        factor = 1e6 / product
     return block.astype(float) * factor * _IMPERIAL
 
 

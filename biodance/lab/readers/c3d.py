@@ -22,16 +22,15 @@ NAME = "C3D"
 EXTENSIONS = (".c3d",)
 PREFERENCE = 0
 FOLLOWS_TOLD = True
-_KEY = 0x50  # Second byte of every C3D file
 
 
 def sniff(head: bytes) -> bool:
     """Return whether the head names a parameter block (2..127) and has the key of C3D files."""
-    return len(head) >= 2 and head[1] == _KEY and 2 <= head[0] <= 127 and b"\x00" in head
+    # Second byte of every C3D file
+    return len(head) >= 2 and head[1] == 0x50 and 2 <= head[0] <= 127 and b"\x00" in head
 
 
 _CLOUD = 6  # Markers that show how a body lies
-_LONGER = 1.5
 _AXES = "XYZ"
 
 
@@ -84,7 +83,11 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     rate = raw.rate if markers is not None else math.nan
     worn = known.name if known is not None and markers is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
-    history = (_contents(raw), *raw.history, *labels.history, *axes_history, _seen(markers), *measure_history)
+    timed = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
+    channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
+    frames = f"{len(raw.points)} frames{timed} from frame {raw.first_frame} on"
+    held = f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}."
+    history = (held, *raw.history, *labels.history, *axes_history, _seen(markers), *measure_history)
     odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
     warnings = (*odd, *measure_warnings, *read.warnings)
     seen = (raw.path.stem, role, markers, read.plates, source, worn, measures)
@@ -127,13 +130,6 @@ def _turned(points: Array, axes: Array) -> Array:
         np.multiply(points[..., only], axis[only], out=turned[..., row])
     turned.setflags(write=False)
     return turned
-
-
-def _contents(raw: RawC3d) -> str:
-    rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
-    channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
-    frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
-    return f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}."
 
 
 def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:
@@ -196,7 +192,7 @@ def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
         return
     extent = np.median(sides, axis=0)
     longest = int(np.argmax(extent))
-    if longest != 2 and extent[longest] > _LONGER * extent[2]:
+    if longest != 2 and extent[longest] > 1.5 * extent[2]:
         raise FileRefused(
             f"{raw.path}: nothing says which way is up (no plates, no POINT:Y_SCREEN, no labels of head and feet), and "
             f"along {_AXES[longest]} the markers are {extent[longest] / extent[2]:.1f} times as long as along Z. Write "

@@ -32,9 +32,6 @@ from biodance.records import Array, Markers, Role, Source, Trial
 
 _HEADER_ROWS = 4
 _FRAME = re.compile(r"\s*\d+(\.0*)?(\s|$)")  # A row that begins with the number of a frame
-_WIDEST = 50.0  # m, between the markers of one frame
-_NARROWEST = 0.05  # m, the same of a hand
-_FEW = 4  # markers, fewer of which may lie anywhere
 _TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 
 NAME = "markers of OpenSim"
@@ -137,12 +134,20 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     header = _header(rows, path)
     names, warnings = _labels(rows, path)
     numbers, raw_time, values, short = _table(rows, len(names), path)
-    unit = _unit(header, path)
+    unit = header.get("Units", "").lower()
+    unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
+    if unit not in METRES:
+        raise FileRefused(
+            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row."
+        )
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
     sides = extents(values, 1).max(axis=1)
     spread = float(np.median(sides)) * METRES[unit] if sides.size else 0.0
-    if spread > _WIDEST or (0 < spread < _NARROWEST and len(names) >= _FEW):
+    # 50.0 m, between the markers of one frame
+    # 0.05 m, the same of a hand
+    # Markers, fewer of which may lie anywhere
+    if spread > 50.0 or (0 < spread < 0.05 and len(names) >= 4):
         raise FileRefused(
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."
@@ -227,16 +232,6 @@ def _rate(header: dict[str, str], path: Path) -> float:
             f"header."
         )
     return rate
-
-
-def _unit(header: dict[str, str], path: Path) -> str:
-    unit = header.get("Units", "").lower()
-    unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
-    if unit not in METRES:
-        raise FileRefused(
-            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row."
-        )
-    return unit
 
 
 def _labels(rows: list[str], path: Path) -> tuple[list[str], list[str]]:

@@ -36,7 +36,6 @@ _COLUMNS = {
     "visit": ("visit", "session"),
 }
 """What a table may call its columns."""
-_KINDS = 6  # Different values up to which a column names conditions
 _CHANNEL = re.compile(r"\s*\"?(time|t|[FM][xyz])\s*[\[(]?\s*([\w·.]*)\s*[\])]?", flags=re.IGNORECASE)
 
 
@@ -112,7 +111,8 @@ def _conditions(trials: list[tuple[IndexedTrial, dict[str, str]]], names: list[s
     for name in names:
         values = {row.get(name, "") for _, row in trials}
         visits = grouped((one.visit, row.get(name, "")) for one, row in trials)
-        if 1 < len(values) <= _KINDS and any(len(set(some)) > 1 for some in visits.values()):
+        # Different values up to which a column names conditions
+        if 1 < len(values) <= 6 and any(len(set(some)) > 1 for some in visits.values()):
             chosen.append(name)
     return chosen
 

@@ -363,29 +363,6 @@ def _origin(value: Any, where: str) -> Array:
 
 def plate_lines(session: Session) -> Iterator[str]:
     """Yield the tables of all plates of a session, else of channels that look like some, each line with a # before."""
-    tables = _plate_tables(session)
-    if not tables:
-        return
-    yield "# Force plates: what stands here comes before what the files say. Take the # from the table's name and from"
-    yield "# what you correct."
-    for name, where, corners, kind, labels, units in tables:
-        yield f"# [plates.{name}] # {where}"
-        yield f"# corners_m = {corners} # m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
-        if kind:
-            yield f"# type = {kind} # of the C3D standard"
-        if labels:
-            yield f"# channels = {json.dumps(labels, ensure_ascii=False)} # labels, or numbers from 1"
-        if units:
-            yield f"# sensitivity = {[*units]} # N, N·m per unit of each channel as in the file; or rows of a matrix"
-        yield '# foot = "left" # or "right", where the markers do not tell which foot stands on it'
-        yield "# use = false # leaves the plate out"
-        yield ""
-
-
-def _plate_tables(session: Session) -> list[tuple[str, str, str, int, Sequence[str | int], tuple[float, ...]]]:
-    """Return name, where it was seen, corners, TYPE (0 = none), channels and units of every plate, or of the channels
-    in the first file whose look like plates.
-    """
     first: dict[str, tuple[Plate, Trial]] = {}
     for trial in session.trials:
         for plate in trial.plates:
@@ -402,9 +379,25 @@ def _plate_tables(session: Session) -> list[tuple[str, str, str, int, Sequence[s
         where = f"its channels are in {raw.path.name}, which does not describe it"
         corners = f"[{', '.join(['[x, y, z]'] * 4)}]"
         for number, columns in enumerate(channel_groups(raw.analog_labels), start=1):
-            labels, kind = [raw.analog_labels[column] for column in columns], 2 if len(columns) == 6 else 3
-            tables.append((f"plate{number}", where, corners, kind, labels, (1.0,) * len(columns)))
-    return tables
+            kind = 2 if len(columns) == 6 else 3
+            named = [raw.analog_labels[column] for column in columns]
+            tables.append((f"plate{number}", where, corners, kind, named, (1.0,) * len(columns)))
+    if not tables:
+        return
+    yield "# Force plates: what stands here comes before what the files say. Take the # from the table's name and from"
+    yield "# what you correct."
+    for name, where, corners, kind, labels, units in tables:
+        yield f"# [plates.{name}] # {where}"
+        yield f"# corners_m = {corners} # m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
+        if kind:
+            yield f"# type = {kind} # of the C3D standard"
+        if labels:
+            yield f"# channels = {json.dumps(labels, ensure_ascii=False)} # labels, or numbers from 1"
+        if units:
+            yield f"# sensitivity = {[*units]} # N, N·m per unit of each channel as in the file; or rows of a matrix"
+        yield '# foot = "left" # or "right", where the markers do not tell which foot stands on it'
+        yield "# use = false # leaves the plate out"
+        yield ""
 
 
 def plate_channels(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:

@@ -1,45 +1,8 @@
-"""``session.toml``: what the analyst says about the subject and the trials, with inheritance subject > session > trial.
+"""``session.toml``: what the analyst says about the subject, the trials, markers and plates, key by key as
+docs/session_folder.md tells it.
 
-```toml
-[subject]
-mass_kg = 66.2        # all keys may be left out
-height_m = 1.75
-sex = "F"             # or "M"
-age = 33
-name = "S01"
-
-[trials."static*"]    # file name without extension, * and ? allowed; the exact name wins over a pattern
-role = "static"       # static, fit, validate, check or skip
-
-[settings]            # as `biodance settings` prints them
-filter.cutoff = 6
-```
-
-``[markers] file = "my_set.toml"`` names the marker set that was worn (a set's name or a file, relative to this one);
-``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
-which segment.
-
-``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (names and possible values:
-`anthropometry/human/girths.csv`), ``foot_outline = {length = 26, breadth = 10, heel_breadth = 7}`` (cm) or
-``"feet.csv"`` how large the feet are (traced points, too), ``scan = "body.obj"`` names the closed surface of the
-standing person, in m (``scan_up`` its axis that points up, by default z).
-
-``[plates.plate1]`` gives or corrects a force plate: ``corners_m``, ``type``, ``channels``, ``sensitivity``,
-``origin_m``, the ``foot`` that stands on it, ``use = false``.
-
-``[markers] drop = ["T10"]`` leaves markers out of every trial. In a table ``[trials.NAME]``, ``exchange = [["LKNE",
-"RKNE"], ["LANK", "RANK", 1.2, 3.4]]`` gives two labels each other's places, from 1.2 to 3.4 s or in the whole trial;
-``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out, ``[[2.5, 3.1, "right"]]`` the cycles
-of that foot alone. ``events = [{side = "left", kind = "strike", time = 1.23}, ...]`` says all strikes and
-offs of a foot, in the place of those that would be found.
-
-``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
-0.6`` what is worn there in kg, on top of ``mass_kg``.
-
-``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
-
-A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
-the session's own file leaves out.
+The exact name of a trial wins over a pattern. A ``subject.toml`` or ``session.toml`` in the folder above (the subject's
+folder) has the same keys and fills in what the session's own file leaves out.
 """
 
 import csv
@@ -122,7 +85,6 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
 
 
 _LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}  # m
-_HEEL = 0.15  # Share of the length, from the heel, at which its breadth is measured
 
 
 def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
@@ -202,7 +164,8 @@ def _sizes(points: Array) -> FootSizes:
     x = points[:, 0] - points[:, 0].min()
     length = float(x.max())
     # The heel's breadth: where a line across, at a share of the length, cuts the closed polygon
-    beyond, y, at = np.roll(x, -1), points[:, 1], _HEEL * length
+    # Share of the length, from the heel, at which its breadth is measured
+    beyond, y, at = np.roll(x, -1), points[:, 1], 0.15 * length
     cut = (x - at) * (beyond - at) < 0
     across = y[cut] + (at - x[cut]) / (beyond[cut] - x[cut]) * (np.roll(y, -1)[cut] - y[cut])
     heel = float(np.ptp(across)) if cut.any() else 0.0
@@ -359,7 +322,10 @@ def read_session_file(folder: Path) -> SessionFile:
     visit: dict[str, Any] = {}
     plates: dict[str, PlateEntry] = {}
     for content in contents:
-        plates |= {name: _over(plates.get(name), entry) for name, entry in content.plates.items()}
+        for name, entry in content.plates.items():
+            # What an inner file says of a plate, filled in by an outer one
+            outer = plates[name].model_dump(exclude_none=True) if name in plates else {}
+            plates[name] = PlateEntry(**{**outer, **entry.model_dump(exclude_none=True)})
         said |= content.subject.model_dump(exclude_none=True)
         visit |= content.session.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
@@ -387,12 +353,6 @@ def check_session_text(path: Path, text: str) -> None:
     _marker_set(path, content.markers)
     if content.markers.map:
         parse_map(content.markers.map, str(path))
-
-
-def _over(earlier: PlateEntry | None, entry: PlateEntry) -> PlateEntry:
-    """Return what an inner file says of a plate, filled in by an outer one."""
-    said = earlier.model_dump(exclude_none=True) if earlier is not None else {}
-    return PlateEntry(**{**said, **entry.model_dump(exclude_none=True)})
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:

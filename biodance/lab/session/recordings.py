@@ -27,7 +27,6 @@ from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.records import Role, Trial, grouped
 from biodance.records.attention import Doubt
 
-_MILLIMETRE = 1e-3
 _MASSES = ("bodymass",)
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
 _NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
@@ -145,7 +144,7 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
         short = _SIDE.sub(lambda side: side[1][0], name)
         if value == 0 or ANGLES.search(short) or _NOT_MEASURES.search(short):
             continue
-        measures[short] = value if short.lower() in _MASSES else value * _MILLIMETRE
+        measures[short] = value if short.lower() in _MASSES else value * 1e-3
     return measures
 
 

@@ -36,14 +36,12 @@ trial of 12 people of 9 laboratories (walks, squats, marching) against their sta
 _DOWN, _SINKS = 0.03, 0.02
 """m of an ankle over its lowest place (5th percentile), and of the iliac spines under their highest (95th), up to which
 both feet are on the ground and the person is upright."""
-_UPRIGHT = 10  # Frames of that at least: on stairs both ankles are hardly ever low
 _ALIKE = 0.4
 """Correlation of the shares of two landmarks, the mean over the pairs: long legs lift all of them."""
 _RISE = 0.026
 """Share of the stature by which acromion markers rise with arms lifted by 90 degrees (45 mm at 1.75 m), in proportion
 to the angle and known to half; measured on 7 people with arms out and 6 with arms down.
 """
-_LIFTED = 45.0  # Degrees of arms that have no marker at the elbow
 
 
 def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
@@ -60,7 +58,8 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
     arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
-    rise = _RISE * (float(np.mean(angles)) if angles else _LIFTED) / 90.0
+    # Degrees of arms that have no marker at the elbow
+    rise = _RISE * (float(np.mean(angles)) if angles else 45.0) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
         height = _mean(at, landmarks)[2] - ankles[2]
@@ -96,7 +95,8 @@ def stature_of_movement(trial: Trial) -> tuple[float, float, str]:
     upright = (low < np.nanpercentile(low, 5, axis=1, keepdims=True) + _DOWN).all(axis=0) & np.isfinite(high)
     if upright.any():
         upright &= high > np.percentile(high[upright], 95) - _SINKS
-    if upright.sum() < _UPRIGHT:
+    # Frames of that at least: on stairs both ankles are hardly ever low
+    if upright.sum() < 10:
         return nothing
     standing = Markers(markers.names, markers.time[upright], markers.xyz[upright])
     stature, sd, told_by = stature_of_markers(replace(trial, markers=standing))
@@ -124,9 +124,7 @@ _MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
 _STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
 _AGE_NAMES = ("age",)
 _SEX_NAMES = ("gender", "sex")
-_SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
 _LEGAL_MASS, _LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
-_TALLER_IS_MALE = 1.70  # m
 _MIDDLE_INDEX = 22.5
 """kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
 
@@ -210,7 +208,8 @@ def _choose(quantity: str, unit: str, declared: list[_Declared], notes: list[str
     if not declared:
         return math.nan
     (first, source), *others = declared
-    for other, elsewhere in [one for one in others if abs(one[0] - first) > _SAME_MASS * first][:1]:
+    # Share by which two declared masses, or statures, may differ
+    for other, elsewhere in [one for one in others if abs(one[0] - first) > 0.01 * first][:1]:
         notes.append(
             f"The {quantity} is {first:g} {unit} in {source} but {other:g} {unit} in {elsewhere}; the first was used. "
             "Are all files of the same person and day?"
@@ -291,7 +290,7 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
 
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
     """Return "M" from 1.70 m on and "F" below, which is right for most adults, and say so."""
-    sex: Literal["F", "M"] = "M" if stature >= _TALLER_IS_MALE else "F"
+    sex: Literal["F", "M"] = "M" if stature >= 1.70 else "F"
     known = f"a stature of {stature:.2f} m is more frequent among"
     basis, people = known if math.isfinite(stature) else "without a stature taken as", "men" if sex == "M" else "women"
     notes.append(f"The sex is not given: {basis} {people}, so tables for {sex} are used. Set sex in session.toml.")

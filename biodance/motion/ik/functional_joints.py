@@ -64,7 +64,6 @@ _NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
 deviations, which are then those of 12 virtual dances.
 """
-_FAULTS = 3  # Joints that lie elsewhere and markers that have moved, at most, in one session
 _NO_POSTURE = 0.1
 """m, RMS marker distance from which on a frame shows no posture of this body: 0.009 to 0.033 at most in eleven real
 sessions, 0.044 in one with exchanged head markers, metres where a recording went wrong.
@@ -120,7 +119,8 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
     held = unshown(scaling.centres, start.theta, start.information)
     scaling, found, refused = _inside_the_body(_holding(scaling, held), postures, start, noise=noise)
     spared: dict[str, tuple[str, float]] = {}
-    for _ in range(_FAULTS):
+    # Joints that lie elsewhere and markers that have moved, at most, in one session
+    for _ in range(3):
         cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise, alike=alike)
         wrong = elsewhere(scaling, found.theta, cost, slopes)
         if wrong is None:
@@ -222,7 +222,11 @@ def _told(
     notes = _placed_notes(moved, turned, start, found)
     if unseen := ", ".join(joint.replace("_", " ") for joint in kept if joint not in refused):
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {unseen}.")
-    notes += [_outside(joint, far) for joint, far in refused.items()]
+    notes += [
+        f"The movement would put the {joint.replace('_', ' ')} joint {1e3 * far:.0f} mm from the static trial's place, "
+        f"outside the body (at most {1e3 * FARTHEST:.0f} mm): it stays where the static trial puts it."
+        for joint, far in refused.items()
+    ]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
     notes += knees_elsewhere(scaling.centres, found.theta, found.information, known=(*wrong, *spared))
@@ -239,14 +243,6 @@ def _placed_notes(
     each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
     fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
     return [f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}."] if each else []
-
-
-def _outside(joint: str, far: float) -> str:
-    """Return what is said of a joint that the movement would put ``far`` m away from the static trial's place."""
-    return (
-        f"The movement would put the {joint.replace('_', ' ')} joint {1e3 * far:.0f} mm from the static trial's place, "
-        f"outside the body (at most {1e3 * FARTHEST:.0f} mm): it stays where the static trial puts it."
-    )
 
 
 def _contradiction(joint: str, far: float) -> str:
@@ -296,11 +292,9 @@ def fixed_point(joint: str) -> float:
 
 NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
-_ONCE_WIDER = 0.015  # m: the same for a body that was found too stiff elsewhere
 _NEARER = 0.9
 """A joint is taken if the markers left out lie nearer than this share of their distance without it."""
 _FRAMES, _TRIALS = 48, 6  # Frames of all trials together that are looked at, and trials, evenly chosen
-_RIDGE = 1e-6  # Of the mean squared lever: keeps what no marker shows where it is
 _TELLING = {
     "neck": ("head",),
     "forearms": ("forearm_hand", "hand"),
@@ -364,11 +358,12 @@ def with_shown_joints(
     while some is not None:
         before = _follow(body, some)
         wider = [(name, with_optional(body, name, landmarks)) for name in left]
+        # 0.015 m: the same for a body that was found too stiff elsewhere
         tried = [
             pair
             for name, more in wider
             if more is not body
-            for pair in _tried(name, more, some, before, _ONCE_WIDER if gains else NEED)
+            for pair in _tried(name, more, some, before, 0.015 if gains else NEED)
         ]
         more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
         if best is None or best.with_it >= _NEARER * best.without:
@@ -414,7 +409,8 @@ def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
     weighted = np.swapaxes(J, 1, 2) * np.repeat(body.markers.weight[rows], 3)
     # J'WJ with a ridge, as markers may leave a coordinate open.
     normal = weighted @ J
-    normal += _RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / J.shape[2] * np.eye(J.shape[2])
+    # Of the mean squared lever: keeps what no marker shows where it is
+    normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / J.shape[2] * np.eye(J.shape[2])
     # Diagonal of J (J'WJ)^-1 J'W: how far each coordinate of a marker follows itself.
     share = np.sum(np.swapaxes(J, 1, 2) * np.linalg.solve(normal, weighted), axis=1)
     return np.asarray(share.reshape(len(q), -1, 3).mean(axis=2))

@@ -53,16 +53,15 @@ class MarkerProblem:
 
 
 class Minimum(NamedTuple):
-    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; largest ``slope`` (B,) m; ``steps`` (B,) tried."""
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; largest ``slope`` (B,) m."""
 
     q: Array
     cost: Array
     slope: Array
-    steps: Index
 
     def part(self, frames: Index) -> "Minimum":
         """Return a copy of some frames."""
-        return Minimum(self.q[frames], self.cost[frames], self.slope[frames], self.steps[frames])
+        return Minimum(self.q[frames], self.cost[frames], self.slope[frames])
 
     def put(self, frames: Index, part: "Minimum") -> None:
         """Replace some frames."""
@@ -91,7 +90,7 @@ def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, ste
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]
     np.clip(angles, problem.chain.lower, problem.chain.upper, out=angles)
-    found = Minimum(q, np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    found = Minimum(q, np.zeros(count), np.full(count, np.inf))
     weight = np.ascontiguousarray(problem.weight)  # one type for the compiled code
     newton.minimise_frames(problem.chain, problem.xyz, weight, frames, found, problem.tolerance, steps)
     return found
@@ -114,7 +113,6 @@ def better(one: Minimum, other: Minimum) -> Minimum:
         np.where(first[:, None], one.q, other.q),
         np.where(first, one.cost, other.cost),
         np.where(first, one.slope, other.slope),
-        one.steps + other.steps,
     )
 
 
@@ -154,7 +152,6 @@ than the reverse.
 MORE_SHARES = (0.25, 0.75)
 """Further guesses for doubtful frames, and for all first frames of a short trial."""
 _SHORT = 640  # Frames below which a trial has too few neighbours to correct a frame that started wrongly
-_NEIGHBOURS = 11  # Frames whose median fit a frame is compared with
 _DOUBT = (1.5, 0.001)
 """A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second
 (m).
@@ -164,9 +161,7 @@ _DOUBT = (1.5, 0.001)
 def search(problem: MarkerProblem, frames: Index) -> Minimum:
     """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
     count = len(frames)
-    out = Minimum(
-        np.zeros((count, problem.body.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
-    )
+    out = Minimum(np.zeros((count, problem.body.nq)), np.zeros(count), np.full(count, np.inf))
     known = np.zeros(0, dtype=np.intp)
     for stride in _STRIDES:
         # Coarse frames first, the last one always; those between start from what is solved around them.
@@ -204,7 +199,8 @@ def _retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     """Return ``found`` with doubtful frames tried again, from their markers and from sound frames beside."""
     # cost = 1/2 sum w r².
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
-    doubtful = rms > _DOUBT[0] * median_filter(rms, min(_NEIGHBOURS, len(rms)), mode="mirror") + _DOUBT[1]
+    # Frames whose median fit a frame is compared with
+    doubtful = rms > _DOUBT[0] * median_filter(rms, min(11, len(rms)), mode="mirror") + _DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
     if not (bad.size and sound.size):
         return found
@@ -324,15 +320,12 @@ class FrameStatus(IntEnum):
 @dataclass(frozen=True, eq=False)
 class InverseKinematics:
     """Postures of T frames: ``q`` (T, nq); ``residual`` (T, K) m distance of marker and model, NaN = not seen;
-    ``status`` (T,) ``FrameStatus``; ``slope`` (T,) m, mean marker displacement that some coordinate could still gain;
-    ``steps`` (T,) Newton steps.
+    ``status`` (T,) ``FrameStatus``.
     """
 
     q: Array
     residual: Array
     status: NDArray[np.int8]
-    slope: Array
-    steps: NDArray[np.intp]
     marker_names: tuple[str, ...]
 
 
@@ -341,7 +334,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
     weight in its frame.
 
     ``guess`` (T, nq) replaces the search for a start (a root that is far off is put right first); ``tolerance`` (m) is
-    the largest ``slope`` of a solved frame.
+    the largest mean marker displacement that a coordinate of a solved frame could still gain.
 
     Raises
     ------
@@ -360,23 +353,20 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
     found = search(problem, own) if guess is None else from_guess(problem, own, _checked(guess, body, chosen)[own])
     leaning = _lean(problem, own, found, open_frames)
     order = np.argsort(np.concatenate([own, open_frames]), kind="stable")
-    q, slope, steps = (
-        np.concatenate([a, b])[order]
-        for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
-    )
+    q, slope = (np.concatenate(two)[order] for two in ((found.q, leaning.q), (found.slope, leaning.slope)))
     continue_angles(problem.chain, q)
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
     residual = np.where(chosen.seen, marker_distances(problem, q), np.nan)
     residual.setflags(write=False)  # the records keep it without a copy
-    return InverseKinematics(q, residual, status, slope, steps, names)
+    return InverseKinematics(q, residual, status, names)
 
 
 def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> Minimum:
     """Solve ``frames`` with their markers and, at ``_LEAN``, all those of the posture between the ``own`` frames."""
     start = interpolate_postures(problem, own, found.q, frames)
     if not frames.size:
-        return Minimum(start, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))
+        return Minimum(start, np.zeros(0), np.zeros(0))
     hidden = problem.weight[frames] == 0
     stand_in = poses(problem.body, start).points(problem.segment, problem.chain.local)
     xyz, weight = problem.xyz.copy(), problem.weight.copy()
@@ -410,9 +400,7 @@ def _too_few(body: Body, markers: Markers, open_coordinates: tuple[str, ...]) ->
     )
 
 
-_TOLERANCE = 1e-7  # m, largest slope of a solved frame, as in `solve_ik`
 _PATIENCE = 100  # Frames between two searches from the markers alone, where the fit has become bad
-_BAD = 0.05  # m: RMS distance beyond which the descent from the last frame is distrusted
 _ONE = np.arange(1)
 
 
@@ -423,7 +411,8 @@ class Follower:
         self.body = body
         self.names = tuple(name for name in body.markers.names if name in labels)
         self._columns = [body.markers.names.index(name) for name in self.names]
-        self._empty = marker_problem(body, self._columns, np.zeros((1, len(self.names), 3)), tolerance=_TOLERANCE)
+        # 1e-7 m, largest slope of a solved frame, as in `solve_ik`
+        self._empty = marker_problem(body, self._columns, np.zeros((1, len(self.names), 3)), tolerance=1e-7)
         self._weight = np.asarray(body.markers.weight)[self._columns]
         self._determined: dict[bytes, bool] = {}
         self._searched = -_PATIENCE
@@ -493,7 +482,8 @@ class Follower:
         found = minimise_markers(problem, _ONE, self.q[None])
         # cost = 1/2 sum w d², so the weighted mean square is 2 cost / sum w.
         rms = np.sqrt(2 * found.cost[0] / problem.weight.sum())
-        if rms > _BAD and self._frame - self._searched > _PATIENCE:
+        # 0.05 m: RMS distance beyond which the descent from the last frame is distrusted
+        if rms > 0.05 and self._frame - self._searched > _PATIENCE:
             self._searched = self._frame
             other = anew()
             return other if other.cost[0] < 0.8 * found.cost[0] else found

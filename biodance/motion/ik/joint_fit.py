@@ -189,7 +189,6 @@ def _wider(covariance: Array, place: Array, usual: float, moved: float) -> float
     return evidence(moved) - evidence(usual)
 
 
-_POSTURES = 150  # Postures taken evenly from all moving trials together
 _STEPS, _SMALLEST = 8, 5e-4  # Most Gauss-Newton steps; m or rad below which a step ends the search
 
 
@@ -217,7 +216,8 @@ def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Marker
         raise TrialRefused(
             "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
         )
-    frames = frames[np.linspace(0, frames.size, min(_POSTURES, frames.size), endpoint=False).astype(int)]
+    # Postures taken evenly from all moving trials together
+    frames = frames[np.linspace(0, frames.size, min(150, frames.size), endpoint=False).astype(int)]
     xyz, first = np.full((frames.size, len(names), 3), np.nan), 0
     for one in trials:
         own = (frames >= first) & (frames < first + one.time.size)
@@ -314,31 +314,19 @@ class _Linear:
         seen = np.isfinite(apart)
         rows = (np.sqrt(body.markers.weight)[:, None] * seen / noise).reshape(len(points), -1)
         residual = rows * np.where(seen, apart, 0.0).reshape(len(points), -1)
+        place, angle = place_jacobian(body, pose, segment, points), q[solved, body.nq - len(body.joints) :]
         # A joint at its limit cannot undo anything.
-        place = place_jacobian(body, pose, segment, points) * _free(body, q[solved])[:, None]
+        place[..., body.n_root :] *= ((angle > body.limits.lower) & (angle < body.limits.upper))[:, None]
         return cls(pose, points, rows, residual, rows[..., None] * place)
 
     def left_open(self, slope: Array) -> Array:
         """Return what of ``slope`` (T, 3K, p) of the points no change of the coordinates can undo, whitened."""
-        return _left_open(self.coordinates, self.rows[..., None] * slope)
-
-
-def _free(body: Body, q: Array) -> NDArray[np.bool_]:
-    """Return (T, nv) False where a joint is at a limit."""
-    angle = q[:, body.nq - len(body.joints) :]
-    inside = (angle > body.limits.lower) & (angle < body.limits.upper)
-    return np.concatenate([np.ones((len(q), body.n_root), dtype=bool), inside], axis=1)
-
-
-def _left_open(coordinates: Array, slope: Array) -> Array:
-    """Return what of ``slope`` (T, r, p) no change of the ``coordinates`` (T, r, nv) can undo, frame by frame."""
-    transposed = np.swapaxes(coordinates, 1, 2)
-    square = transposed @ coordinates
-    # Ridge in proportion to the mean square: coordinates that no marker moves.
-    size = np.einsum("tii->t", square)[:, None, None] / square.shape[1]
-    return np.asarray(
-        slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)
-    )
+        slope, transposed = self.rows[..., None] * slope, np.swapaxes(self.coordinates, 1, 2)
+        square = transposed @ self.coordinates
+        # Ridge in proportion to the mean square: coordinates that no marker moves.
+        size = np.einsum("tii->t", square)[:, None, None] / square.shape[1]
+        undone = np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)
+        return np.asarray(slope - self.coordinates @ undone)
 
 
 def fit_joints(scaling: Scaling, postures: Markers, start: CalibrationState, *, noise: float) -> CalibrationState:

@@ -283,12 +283,6 @@ class Leg:
         a, b, c = self._length_terms()
         return np.sqrt(a + b * np.cos(knee) + c * np.sin(knee))
 
-    def _knee(self, length: Array) -> Array:
-        a, b, c = self._length_terms()
-        # cos(knee - atan2(c, b)) = (length² - a) / hypot(b, c).
-        reach = np.clip((length**2 - a) / np.hypot(b, c), -1.0, 1.0)
-        return np.arctan2(c, b) + np.arccos(reach)
-
     def solve(self, pelvis_turn: Array, pelvis: Array, foot_turn: Array, ankle: Array) -> Array:
         """Return the six angles (T, 6) rad in the order of ``LEG``.
 
@@ -300,7 +294,9 @@ class Leg:
         away = hip - ankle
         distance = np.linalg.norm(away, axis=1)
         length = soft_limit(distance, float(self.length(np.radians(0.3))), 0.002)
-        knee = self._knee(length)
+        a, b, c = self._length_terms()
+        # cos(knee - atan2(c, b)) = (length² - a) / hypot(b, c).
+        knee = np.arctan2(c, b) + np.arccos(np.clip((length**2 - a) / np.hypot(b, c), -1.0, 1.0))
         # Foot's axes: the way from ankle to hip.
         local = np.einsum("tji,tj->ti", foot_turn, away * (length / distance)[:, None])
         bend = axis_rotation(np.array([0.0, 0.0, -1.0]), knee)

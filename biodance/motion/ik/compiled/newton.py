@@ -424,13 +424,11 @@ def _turn_stopped_by_angles(stopped, better, cardan):
 @compiled
 def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
     """Move the postures ``found.q`` (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in
-    ``frames`` (B,), in at most ``steps``, and fill the rest of ``found``: ``cost`` (B,) m², ``slope`` (B,) m, ``steps``
-    (B,) taken.
+    ``frames`` (B,), in at most ``steps``, and fill the rest of ``found``: ``cost`` (B,) m², ``slope`` (B,) m.
 
-    The slope is the largest gradient over the
-    coordinates that no limit holds, divided by the marker weight that the coordinate moves and its lever (1, or LENGTH
-    for an angle): a mean marker displacement that could still be gained; a frame stops where it falls under
-    ``tolerance``.
+    The slope is the largest gradient over the coordinates that no limit holds, divided by the marker weight that the
+    coordinate moves and its lever (1, or LENGTH for an angle): a mean marker displacement that could still be gained; a
+    frame stops where it falls under ``tolerance``.
     """
     q, cost, slope = found.q, found.cost, found.slope
     at, nv, nq = sums_of(chain), chain.depth.shape[0], q.shape[1]
@@ -447,7 +445,7 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
             gradient(chain, at, g)
             _held_at(chain, now, g, held)
             turn_balls(chain, at, g, held, cardan, turning)
-            slope[f], found.steps[f] = _largest_slope(chain, at, g, held), step
+            slope[f] = _largest_slope(chain, at, g, held)
             if slope[f] <= tolerance or step == steps:
                 break
             newton = slope[f] < _NEAR and not bent
