@@ -401,7 +401,7 @@ def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
             place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
             # Away from the present angles towards the elbow's.
             # of shoulder flexion, adduction, rotation, elbow flexion: away from the trunk
-            J, out = slope[:, 0][:, :, arm], np.array(tuple(np.radians([0.0, -60.0, 40.0, 60.0]))) - x[:, arm]
+            J, out = slope[:, 0][:, :, arm], np.radians([0.0, -60.0, 40.0, 60.0]) - x[:, arm]
             # Damped pseudoinverse J'(J J' + d 1)^-1.
             inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + 1e-3 * np.eye(3))
             # out + J^+ (e - J out) = J^+ e + (1 - J^+ J) out: `out` acts in the null space of the palm's place.
