@@ -163,3 +163,18 @@ def test_power_lies_where_a_movement_repeats() -> None:
     own = np.flatnonzero(where.band == BANDS.of(500)[60])
     assert abs(int(np.argmax(power)) - 60) <= 1
     assert power[60 - 4 : 60 + 5].sum() > 0.9 * power[own].sum()
+
+
+def test_power_about_a_coefficient_of_a_short_run_is_its_own() -> None:
+    """Four coefficients of half a second: weights 3, 2, 1 of the neighbours that are there."""
+    case: Any = SimpleNamespace(
+        motion=SimpleNamespace(rate=25.0), trial=SimpleNamespace(name="t", settings=USUAL), predicted=np.zeros((12, 6))
+    )
+    wave = np.cos(np.pi * 3 * (np.arange(12) + 0.5) / 12)  # coefficient 3 alone, 3.1 Hz
+    case.predicted = np.outer(wave, np.eye(6)[2])
+    where = spectrum((case,), (np.ones(12, bool),), np.zeros(3), shortest=0.4)
+    power = power_about(where, (case,), np.tile(np.eye(6), (len(BANDS), 1, 1)))
+    fast = np.flatnonzero(where.band == where.band[3])
+    assert int(np.argmax(power)) == 3
+    assert power[fast].mean() == pytest.approx(1.0)
+    assert power[4] / power[3] == pytest.approx((2 / 8) / (3 / 8), rel=0.15)

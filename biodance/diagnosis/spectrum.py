@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from biodance.effects import Case
 from biodance.errors import TrialRefused
@@ -94,8 +95,8 @@ def power_about(where: Spectrum, cases: tuple[Case, ...], whiteners: Array) -> A
     # A run begins where the frequency falls or another trial begins.
     first = np.flatnonzero((np.diff(where.band, prepend=len(BANDS)) < 0) | (np.diff(where.trial, prepend=-1) != 0))
     for run in np.split(np.arange(power.size), first[1:]):
-        around = [np.convolve(some, _ABOUT, "same") for some in (power[run], np.ones(run.size))]
-        power[run] = around[0][: run.size] / around[1][: run.size]
+        around, weight = (convolve1d(some, _ABOUT, mode="constant") for some in (power[run], np.ones(run.size)))
+        power[run] = around / weight
     mean = np.bincount(where.band, power, len(BANDS)) / np.maximum(np.bincount(where.band, minlength=len(BANDS)), 1)
     there = (where.band > 0) & (mean[where.band] > 0)
     return np.where(there, power / np.where(there, mean[where.band], 1.0), 1.0)

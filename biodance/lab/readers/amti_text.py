@@ -67,7 +67,6 @@ def _table(text: str, path: Path) -> tuple[list[str], Array]:
     for line in lines:
         first = _cells(line)
         # All numbers of a row but one are a damaged row and no header.
-        # five of the six channels are numbers
         if first and sum(_numbers([cell]) is not None for cell in first) >= min(5, len(first)):
             break
         header, first, begin = first or header, [], begin + 1
