@@ -148,6 +148,14 @@ def test_the_share_of_the_noise_that_goes_with_the_movement_is_found(share: floa
     assert own_noise(replace(found, y=y), power)[1] == pytest.approx(share, abs=0.15)
 
 
+def test_a_loud_fault_does_not_tell_how_noise_is_spread() -> None:
+    found = drawn(np.ones(BLOCKS), each=48)
+    power = np.where(np.arange(found.plates // len(CHANNELS)) % 8 == 0, 4.5, 0.5)
+    y = np.array(found.y)
+    y[: found.plates] += 20.0 * np.repeat(power > 1, len(CHANNELS))
+    assert own_noise(replace(found, y=y), power)[1] == 0.0
+
+
 def test_power_lies_where_a_movement_repeats() -> None:
     """A force of 1.5 Hz in 20 s has its power about coefficient 60, and every band has one on average."""
     time = np.arange(0.0, 20.0, 0.04)

@@ -149,6 +149,6 @@ def test_tracked_angles_go_on_from_frame_to_frame(dance):
 
 def test_of_minima_that_differ_by_rounding_the_first_is_taken():
     cost = np.array([1e-3, 1e-3])
-    one, other = (Minimum(np.full((2, 1), value), cost, cost, np.zeros(2, dtype=np.intp)) for value in (1.0, 2.0))
+    one, other = (Minimum(np.full((2, 1), value), cost, cost) for value in (1.0, 2.0))
     lower = np.array([1e-3 - 1e-15, 1e-3 - 1e-6])
     assert better(one, other._replace(cost=lower)).q.ravel().tolist() == [1.0, 2.0]

@@ -15,7 +15,8 @@ import biodance
 from biodance.body.body import body_text
 from biodance.cli import run
 from biodance.dance.dance import Dance
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain
+from biodance.diagnosis.accept import Gain
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.effects import QualityCheck
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.identification import identify_body

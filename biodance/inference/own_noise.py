@@ -64,18 +64,22 @@ def _left(rows: Rows, columns: VisibleColumns, found: ScaledFit) -> tuple[Array,
 
 def _moving(rows: Rows, power: Array, found: ScaledFit, quiet: Array, left: Array, taken: Array) -> float:
     """Return the share of the noise that goes with ``power`` (n,), the most probable of `_SHARES`: what is ``left``
-    (n,) has the variance s_q^2 (1 - share + share power), and each s_q is free.
+    (n,) has the variance s_q^2 (1 - share + share power), and each s_q is free. Bands and channels that are louder than
+    expected hold a fault, and do not tell how noise is spread.
     """
     block = rows.block[: rows.plates]
     # E[e^2] = s^2 (1 - h): rows that columns have taken tell less than they seem to.
     free = 1 - taken * np.exp(-2 * found.scales.noise) / quiet[block] ** 2
-    square, count = left**2 / np.maximum(free, _LEAST_FREE), np.bincount(block)
-    there = count > 0
+    square, count = left**2 / np.maximum(free, _LEAST_FREE), np.maximum(np.bincount(block), 1)
+    # The sum of n squares is n +- sqrt(2 n): louder by two standard deviations is louder.
+    usual = (np.bincount(block, square) <= count + 2 * np.sqrt(2 * count))[block]
+    block, square, power = block[usual], square[usual], power[usual]
 
     def log_density(share: float) -> float:
         variance = 1 - share + share * power
-        level = np.bincount(block, square / variance)[there] / count[there]
-        return -0.5 * float(count[there] @ np.log(np.maximum(level, 1e-12)) + np.log(variance).sum())
+        # Rows of a block share the mean of its squares; blocks without rows have none.
+        level = (np.bincount(block, square / variance, len(count)) / count)[block]
+        return -0.5 * float(np.log(np.maximum(level * variance, 1e-12)).sum())
 
     return max(_SHARES, key=log_density)
 
