@@ -173,7 +173,7 @@ def is_possible(lump: parts.RigidInertia) -> bool:
     """Whether some body has this mass, centre and inertia."""
     moments = np.linalg.eigvalsh(lump.inertia)
     # Triangle inequality: the largest moment at most the sum of the others.
-    # Of the largest moment of inertia: numbers of a file are rounded
+    # Less a ten-thousandth of the largest, by which numbers of a file are rounded.
     return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -1e-4 * moments[-1])
 
 

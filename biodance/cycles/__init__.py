@@ -112,7 +112,7 @@ def compare_angles(
             continue
         known = motion.determined & np.isfinite(theirs).all(axis=1)
         ours, other = motion.angles[known, j], theirs[known, axis]
-        # Frames without which nothing is compared
+        # Fewer than twenty frames are not compared.
         if ours.size < 20:
             continue
         moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0

@@ -103,7 +103,7 @@ def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np
     pose, feet = poses(body, motion.q), _both(body)
     soles = [pose.points([foot.segment] * len(foot.outline), foot.outline) for foot in feet]
     if down is None:
-        # m over the floor: planted
+        # A planned sole within 1 cm of the floor is planted.
         down = np.stack([sole[:, :, 2].mean(axis=1) < 0.01 for sole in soles], axis=1)
     parts = borne_by_feet(wrench, soles, down)
     names = [body.segments[foot.segment] for foot in feet]
@@ -174,6 +174,7 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
         rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(data), q))
         for part in driver.touching(data):
             touched.setdefault(part, float(motion.time[frame]))
+        # Fallen: the root is below 0.6 of its planned height.
         if data.qpos[2] < 0.6 * motion.q[frame, 2]:
             fell = float(motion.time[frame])
             break

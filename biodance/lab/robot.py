@@ -63,7 +63,7 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
     notes = [*cells.said[1:], *["Angles were converted from degrees."] * bool((factors != 1).any())]
     steps = np.diff(time)
-    # Of the usual step: from there on a sample is missing
+    # A step of 1.6 usual ones: a sample is missing.
     late = np.flatnonzero(steps > 1.6 * np.median(steps))
     if late.size:
         others = f" and at {late.size - 1} other place{'s' * (late.size > 2)}" if late.size > 1 else ""

@@ -67,7 +67,7 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
         Markers are missing, too few, or not where they are said to be.
     """
     lacks = [name for name in places if name not in markers.names]
-    # Markers that fix a posture
+    # Three markers fix a posture.
     if lacks or len(places) < 3:
         what = f"markers {', '.join(lacks)} are missing" if lacks else f"{len(places)} markers tell no posture"
         raise TrialRefused(f"{where}: {what}; recording.toml [base] markers needs three and more of those recorded.")
@@ -178,7 +178,7 @@ def ground(
     if set(body.feet) != set(SIDES):
         raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
     turn, place, height = _soles(body, angle)
-    # Times the length m from root to sole at zero angles
+    # In proportion to the way from root to sole at zero angles, m.
     depth = under * float(np.linalg.norm(_soles(body, np.zeros((1, len(body.joints))))[1][0, 0]))
     stands = height > -depth
     unclear = np.asarray(stands.all(axis=0) & (height > depth).any(axis=0))

@@ -348,7 +348,7 @@ def chart_of(body: Body) -> Chart:
         # Meeting in one point, no rotation between, and square to each other: a ball joint.
         turns = np.array([two.rotation, three.rotation, axes @ axes.T])
         apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
-        # 1e-8 m, and of the entries of rotation matrices: what differs by less is equal
+        # Places (m) and entries of rotation matrices that differ by less are equal.
         if max(apart) < 1e-8:
             first.append(i)
             # +1 or -1: axes of the left side are mirrored, and turn the other way about each.

@@ -243,7 +243,7 @@ def _offsets(trial: Trial, soles: Soles, rests: Mask, load: Mask) -> Array:
         found[:] = lowest - min(plate.height for plate in trial.plates)
     # A foot that never stood on a plate: as high as the other one.
     found = np.where(np.isnan(found), found[::-1], found)
-    # 0.02 m: the two feet's points may be this differently high above the ground
+    # The same point of both feet may be 2 cm differently high above the ground.
     return np.minimum(found, found[::-1] + 0.02)
 
 

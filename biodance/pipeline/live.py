@@ -300,7 +300,7 @@ class StreamWatch:
         """
         fell = watch.silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
         silent = {f"silent {said.target}": said for said in fell}
-        # the filter forgets a foot that left in a tenth of 0.3 s
+        # Nobody is on a plate that is called empty for 0.3 s: the filter forgets a foot that left in a tenth of that.
         count = max(3, round(0.3 * plates[0].wrench.rate))
         late = slice(max(0, until - count), until)
         gone = {said.target for said in self.warnings if said.effect == "plate_gone"}

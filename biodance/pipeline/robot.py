@@ -109,7 +109,7 @@ def misweighed(found: SessionIdentification) -> list[Attention]:
             f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
             f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
         )
-        # of the weight
+        # The identified robot may differ from what the plate carries by 2 % of its weight.
         out += [Attention("warn", text, one.name, "plate")] * (abs(seen - needed) > 0.02 * needed)
     return out
 

@@ -87,7 +87,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = (), *, proven: bool = F
         at = f" at {place_in_words(finding.target)}" if finding.target else ""
         do = finding.advice.split(". ")[0].rstrip(".")
         fact = f"a {name} was found{at}{f', {size.value}' if size.value else ''}"
-        # words fit into a headline
+        # Advice of at most eight words fits into a headline.
         return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= 8 else _LISTED)
     whole, _, channel = finding.target.rpartition(":")
     first, _, other = channel.partition("->")

@@ -155,7 +155,7 @@ def _together(rows: list[Attention]) -> Attention:
         trials = list(dict.fromkeys(one.trial for one in rows[1:] if one.trial != rows[0].trial))
         return replace(rows[0], text=f"{rows[0].text} Likewise: {', '.join(trials)}." if trials else rows[0].text)
     found = [(one.trial, one.text.partition(LIMIT_TOLD)[0]) for one in rows]
-    # Trials of one check that are told one by one
+    # Up to four trials of one check are told one by one.
     values = _range(found) if len(rows) > 4 else ""
     values = values or ", ".join(f"{trial} {value}" for trial, value in found)
     return replace(rows[0], text=f"{values}{LIMIT_TOLD}{rows[0].text.partition(LIMIT_TOLD)[2]}", trial="")

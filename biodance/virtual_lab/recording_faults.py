@@ -189,7 +189,7 @@ def mains_hum(channel: Channel, amplitude: float) -> Array:
 def plate_hysteresis(channel: Channel, width: float) -> Array:
     """Follow the load in a loop of half ``width`` (N or N·m): part of it passes through joints with play."""
     load, loops = channel.load, []
-    # N, half the plays in the plate's joints
+    # Half the play of each joint of the plate: N, of a moment a third as many N·m.
     for slack in np.array((10.0, 20.0, 40.0)) * (1.0 if channel.force else 0.33):
         # a joint with play moves only when pushed by its slack
         through, place = np.empty_like(load), load[0]

@@ -329,11 +329,11 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     way = tip - shoulder
     along = way / np.linalg.norm(way)
     angle = float(np.arctan2(sign * along[2], -along[1]))
-    # 8.0 deg: Least angle between a straight arm and the vertical
+    # A straight arm hangs at least 8 degrees from the vertical, clear of the trunk.
     if angle < np.radians(8.0):
         raise SessionRefused(_touching(side, f"it hangs {np.degrees(angle):.0f} degrees from the vertical"))
     reach = float(np.linalg.norm(way))
-    # Of the stature: wrist to finger tips (Winter 2009)
+    # From wrist to finger tips it is 0.108 of the stature (Winter 2009).
     whole = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + 0.108 * skeleton.stature
     if abs(reach / whole - 1) > _REACH:
         raise SessionRefused(

@@ -179,7 +179,7 @@ def seat(body: Body, *, share: float = 1.0, height: float = 0.0) -> Stance:
     """
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in SIDES]
-    # m under the soles
+    # Hanging legs have 8 cm between their soles and the ground.
     hips = height + SEAT_TO_HIP if height else float(max(legs) + feet.ankle[:, 2].max()) + 0.08
     # the legs of a stool of 0.4 m by 0.4 m, from below the hips
     return replace(feet, props=np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]]), seat=hips)

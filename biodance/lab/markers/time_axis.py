@@ -156,7 +156,7 @@ def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
     edges = [0, *holes.tolist(), stamps.size]
     longest = int(np.argmax(np.diff(edges)))
     rows = slice(edges[longest], edges[longest + 1])
-    # Rows without which nothing is looked for
+    # Fewer than a hundred rows tell no grid.
     paths = _paths(xyz[rows]) if time_axis(stamps, where="").sampled and rows.stop - rows.start >= 100 else None
     grid = None if paths is None else _on_grid(stamps[rows], paths)
     if grid is None:
@@ -224,8 +224,7 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     # Fast rows tell most of their instants.
     share = weight / weight.sum()
     places = np.rint((instants - instants[0]) / _TICK).astype(int)
-    # Zeros behind: rates are tried more finely than one cycle in the whole recording.
-    # Rates tried per cycle that a recording holds more
+    # Zeros behind: rates are tried sixteen times more finely than one cycle in the whole recording.
     count = next_fast_len(16 * (int(places[-1]) + 1), real=True)
     # Sum of share exp(-i w t): large where all instants lie on a grid of that rate.
     gathered = np.fft.rfft(np.bincount(places, share), count)
@@ -234,7 +233,7 @@ def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | 
     best = legal[int(np.argmax(np.abs(gathered[legal])))]
     # |sum of share exp(i phase)|² of random phases is exponential with the mean sum(share²); so many rates were tried
     chance = legal.size * np.exp(-(np.abs(gathered[best]) ** 2) / np.sum(share**2))
-    # That stamps without a grid gather as much at any rate
+    # Probability that stamps without a grid gather as much at any rate.
     if chance > 1e-6:
         return None
     frequency = float(tried[best])

@@ -144,9 +144,7 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
     sides = extents(values, 1).max(axis=1)
     spread = float(np.median(sides)) * METRES[unit] if sides.size else 0.0
-    # 50.0 m, between the markers of one frame
-    # 0.05 m, the same of a hand
-    # Markers, fewer of which may lie anywhere
+    # No frame has markers 50 m apart, and four or more of a hand are 5 cm apart.
     if spread > 50.0 or (0 < spread < 0.05 and len(names) >= 4):
         raise FileRefused(
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "

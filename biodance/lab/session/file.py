@@ -323,7 +323,7 @@ def read_session_file(folder: Path) -> SessionFile:
     plates: dict[str, PlateEntry] = {}
     for content in contents:
         for name, entry in content.plates.items():
-            # What an inner file says of a plate, filled in by an outer one
+            # An outer file fills in what the inner one does not say of a plate.
             outer = plates[name].model_dump(exclude_none=True) if name in plates else {}
             plates[name] = PlateEntry(**{**outer, **entry.model_dump(exclude_none=True)})
         said |= content.subject.model_dump(exclude_none=True)

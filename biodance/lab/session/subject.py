@@ -58,7 +58,7 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
     arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
-    # Degrees of arms that have no marker at the elbow
+    # Arms without a marker at the elbow are taken to be lifted by 45 degrees.
     rise = _RISE * (float(np.mean(angles)) if angles else 45.0) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
@@ -95,7 +95,7 @@ def stature_of_movement(trial: Trial) -> tuple[float, float, str]:
     upright = (low < np.nanpercentile(low, 5, axis=1, keepdims=True) + _DOWN).all(axis=0) & np.isfinite(high)
     if upright.any():
         upright &= high > np.percentile(high[upright], 95) - _SINKS
-    # Frames of that at least: on stairs both ankles are hardly ever low
+    # Ten such frames at least: on stairs both ankles are hardly ever low.
     if upright.sum() < 10:
         return nothing
     standing = Markers(markers.names, markers.time[upright], markers.xyz[upright])

@@ -358,7 +358,7 @@ def with_shown_joints(
     while some is not None:
         before = _follow(body, some)
         wider = [(name, with_optional(body, name, landmarks)) for name in left]
-        # 0.015 m: the same for a body that was found too stiff elsewhere
+        # Markers of a body that was found too stiff elsewhere need be 15 mm off, not `NEED`.
         tried = [
             pair
             for name, more in wider
@@ -409,7 +409,7 @@ def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
     weighted = np.swapaxes(J, 1, 2) * np.repeat(body.markers.weight[rows], 3)
     # J'WJ with a ridge, as markers may leave a coordinate open.
     normal = weighted @ J
-    # Of the mean squared lever: keeps what no marker shows where it is
+    # A millionth of the mean squared lever keeps what no marker shows where it is.
     normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / J.shape[2] * np.eye(J.shape[2])
     # Diagonal of J (J'WJ)^-1 J'W: how far each coordinate of a marker follows itself.
     share = np.sum(np.swapaxes(J, 1, 2) * np.linalg.solve(normal, weighted), axis=1)

@@ -216,7 +216,7 @@ def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Marker
         raise TrialRefused(
             "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
         )
-    # Postures taken evenly from all moving trials together
+    # At most 150 postures, evenly from all moving trials together.
     frames = frames[np.linspace(0, frames.size, min(150, frames.size), endpoint=False).astype(int)]
     xyz, first = np.full((frames.size, len(names), 3), np.nan), 0
     for one in trials:
