@@ -48,14 +48,16 @@ class ShoulderGirdle(MissingJoint):
 
     @classmethod
     def extended_body(cls, case: Case) -> Body | None:
-        """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both
-        shoulders, or it has them.
+        """Return the body with two joints at the inner end of each collar bone that it lacks; None where the markers do
+        not show both shoulders, or it has them both.
         """
         body = case.body
         seen = {body.markers.names[c] for c in case.marker_columns}
-        if shoulders(body) is None or not seen.issuperset(SHOULDERS) or "right_clavicle" in body.links:
+        missing = [side for side in ("right", "left") if f"{side}_clavicle" not in body.links]
+        if shoulders(body) is None or not seen.issuperset(SHOULDERS) or not missing:
             return None
-        for side, sign in (("right", 1.0), ("left", -1.0)):
+        for side in missing:
+            sign = 1.0 if side == "right" else -1.0
             shoulder = body.joint_index(f"{side}_shoulder_flexion")
             place = sternoclavicular(body, side)
             axes = {
