@@ -8,7 +8,7 @@ import pytest
 from human_cases import CORNERS, human_case, moving
 
 from biodance.body.body import Body
-from biodance.body.changes import recentre_joint
+from biodance.body.changes import Cut, recentre_joint, with_part
 from biodance.body.human.human import human
 from biodance.body.parts import JointError, shift_matter, smallest_eigenvalues
 from biodance.diagnosis.accept import case_fit
@@ -94,6 +94,30 @@ def test_the_parts_are_together_the_whole_whatever_it_weighs(name: str) -> None:
         _, place = extended.place_on_segment(extended.segment_joint[k])
         together += shift_matter(place) @ links[k]
     np.testing.assert_allclose(together, whole.reshape(-1, 10)[old], atol=1e-9)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_collar_bone_is_asked_for_where_the_other_one_moves_already(side: str) -> None:
+    case, other = human_case(120), "left" if side == "right" else "right"
+    both = KINDS["shoulder_girdle"](case)
+    assert both is not None
+    cut = Cut(
+        "trunk_head",
+        f"{side}_clavicle",
+        {f"{side}_clavicle_elevation": np.array([1.0, 0.0, 0.0])},
+        np.array([0.05, 0.4, 0.02 if side == "right" else -0.02]),
+        np.zeros(10),
+        (),
+        (case.body.joint_index(f"{side}_shoulder_flexion"),),
+    )
+    one = with_part(case.body, cut)
+    asked = KINDS["shoulder_girdle"](replace(case, body=one))
+    assert asked is not None
+    assert [joint.name for joint in asked.joints if joint.name not in [j.name for j in one.joints]] == [
+        f"{other}_clavicle_elevation",
+        f"{other}_clavicle_protraction",
+    ]
+    assert KINDS["shoulder_girdle"](replace(case, body=both)) is None
 
 
 def test_what_is_unlike_the_table_goes_along_with_the_thorax() -> None:
