@@ -12,7 +12,7 @@ from biodance.body.human.measures import (
     Measures,
 )
 from biodance.body.human.scaling import chain_angles, measure_static
-from biodance.body.human.skeleton import standing_tilt
+from biodance.body.human.skeleton import SIDES, standing_tilt
 from biodance.body.human.static_centres import arm_centres
 from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused
@@ -89,6 +89,29 @@ def test_the_generic_person_is_found_again() -> None:
 def test_fewer_markers_still_make_a_body(drop: tuple[str, ...]) -> None:
     body, _ = scaled(SUBJECT, standing_trial(drop=drop))
     assert not set(drop) & set(body.markers.names)
+
+
+@pytest.mark.parametrize("kept", ["C7", "STRN"])
+def test_one_marker_of_a_trunk_that_bends_does_not_tilt_the_pelvis(kept: str) -> None:
+    """Such a trunk is held: what its marker does is no posture of the pelvis."""
+    whole = human(SUBJECT)
+    on_top = [
+        name
+        for name, k in zip(whole.markers.names, whole.markers.segment, strict=True)
+        if whole.segments[k] not in {"pelvis", *(f"{s}_{p}" for s in SIDES for p in ("thigh", "shank", "foot"))}
+    ]
+    static = standing_trial(drop=tuple(name for name in on_top if name != kept))
+    body, _ = scaled(SUBJECT, static)
+    assert not body.free[[body.joint_index("trunk_flexion")]].any()
+    bent = np.tile(whole.neutral, (20, 1))
+    bent[:, 2], bent[:, 7 + whole.joint_index("trunk_flexion")] = 0.95, np.radians(np.linspace(0, 30, 20))
+    assert static.markers is not None
+    columns = [whole.markers.names.index(name) for name in static.markers.names]
+    seen = poses(whole, bent).points([whole.markers.segment[k] for k in columns], whole.markers.position[columns])
+    found = solve_ik(body, Markers(static.markers.names, np.arange(20) / 100, seen))
+    tilt = poses(body, found.q).rotation[:, 0]
+    turned = np.degrees(np.arccos((np.einsum("ij,tij->t", tilt[0], tilt) - 1) / 2 - 1e-12))
+    assert turned.max() < 0.1
 
 
 def test_missing_landmarks_are_named() -> None:

@@ -70,7 +70,8 @@ def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> 
     hidden: list[str] = []
     for side in SIDES:
         hidden += _arm(mark, upright, side)
-    segments = {f"{side}_{part}" for side in hidden for part in _ARM}
+    # Markers of what is carried stiffly would turn what carries it.
+    segments = {f"{side}_{part}" for side in hidden for part in _ARM} | ({"trunk_head"} if unseen else set())
     worn = {marker.label for marker in posture.marker_set.markers if marker.segment in segments}
     points = {label: place for label, place in posture.points.items() if label not in worn}
     unseen += [joint for side in hidden for joint in _ARM_JOINTS[side]]
