@@ -4,12 +4,18 @@ import ast
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import biodance
-from biodance.pipeline.saved_results import blas
+from biodance.body.body import body_text
+from biodance.lab.plates.faults import PlateCorrection
+from biodance.pipeline.export import body_of_result
+from biodance.pipeline.saved_results import BODY_FILE, blas, keep_motions, kept_trials, read_kept
+from biodance.report.files import write_files
 from biodance.version import NO_COMMIT, commit
 
 DOOR = Path(biodance.__file__)
@@ -169,6 +175,20 @@ def test_a_visit_is_exported_as_it_is_in_memory(result, tmp_path):
     assert {one.name.split("_")[1] for one in place.rglob("*_motion.tsv")} >= {"task-dance1", "task-squat1"}
     with pytest.raises(biodance.BiodanceError, match="--trial: a file of format osim holds one body"):
         biodance.export(result, tmp_path / "no.osim", format="osim", trial="squat_1")
+
+
+def test_a_results_folder_gives_the_forces_that_its_body_was_found_with(folder, tmp_path):
+    gain = PlateCorrection("plate_gain", "Fz", 0.06, 0.003, "session visit")
+    corrected = biodance.examine(biodance.read_session(folder), corrections=(gain,))
+    write_files(tmp_path, {BODY_FILE: body_text(*body_of_result(corrected))})
+    keep_motions(corrected, tmp_path)
+    kept = read_kept(tmp_path)
+    _, (again,) = kept_trials(kept, ("squat_1",))
+    np.testing.assert_array_equal(again.trial.wrench.value, corrected["squat_1"].trial.wrench.value)
+    plain = biodance.read_session(folder)["squat_1"].wrench.force[:, 2].mean()
+    assert again.trial.wrench.force[:, 2].mean() == pytest.approx(plain / 1.06, rel=0.01)
+    with pytest.raises(biodance.BiodanceError, match=r"plates were corrected when the results were made \(a lab.toml"):
+        kept_trials(replace(kept, corrections=()), ("squat_1",))
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="there is no git here")

@@ -5,7 +5,7 @@ import os
 import platform
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 from biodance.body.body import Body, read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
 from biodance.lab.plain_text import whole_file
+from biodance.lab.plates.faults import PlateCorrection, corrected_trial
 from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session, visit_words
 from biodance.lab.session.results_folder import doubt_about, read_manifest, refuse_mixture
@@ -93,8 +94,8 @@ _TEXTS = ("marker_names", "notes", "joint_names")
 @dataclass(frozen=True, eq=False)
 class KeptResults:
     """A results folder as read: ``body`` with ``source`` in words; ``motions`` by trial; ``hashes`` of the recordings
-    by trial, what their ``loads`` sum to after preparing (N·s, N·m·s), and their ``cutoffs`` (Hz); ``session`` folder
-    of the recordings, whose ``settings`` were chosen.
+    by trial, what their ``loads`` sum to after preparing (N·s, N·m·s), and their ``cutoffs`` (Hz); the ``corrections``
+    with which plates were made; ``session`` folder of the recordings, whose ``settings`` were chosen.
     """
 
     body: Body
@@ -103,6 +104,7 @@ class KeptResults:
     hashes: dict[str, str]
     loads: dict[str, Array]
     cutoffs: dict[str, float]
+    corrections: tuple[PlateCorrection, ...]
     session: Path
     settings: Mapping[str, Value]
 
@@ -117,6 +119,7 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
     held["hashes"] = np.array([one.trial.source.sha256 for one in moved])
     held["loads"] = np.array([_load(one.trial) for one in moved])
     held["cutoffs"] = np.array([motion_filter(one.trial.settings).cutoff for one in moved])
+    held["corrections"] = np.array(json.dumps([asdict(one) for one in result.corrections]))
     held["settings"] = np.array(json.dumps(result.settings.as_dict()))
     for k, one in enumerate(moved):
         held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in BY_FRAME}
@@ -176,16 +179,17 @@ def read_kept(folder: Path) -> KeptResults:
             hashes = dict(zip(motions, (str(one) for one in held["hashes"]), strict=True))
             loads = dict(zip(motions, held["loads"], strict=True))
             cutoffs = dict(zip(motions, map(float, held["cutoffs"]), strict=True))
+            corrections = tuple(PlateCorrection(**one) for one in json.loads(str(held["corrections"])))
             session = Path(os.path.normpath(folder / str(held["session"])))
             settings = json.loads(str(held["settings"]))
     except FileRefused:
         raise
-    except (BadZipFile, EOFError, OSError, ValueError, KeyError, MemoryError, zlib.error) as error:
+    except (BadZipFile, EOFError, OSError, ValueError, TypeError, KeyError, MemoryError, zlib.error) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
     manifest = read_manifest(folder)
     if manifest and not session.is_dir():  # the results were moved, the recordings were not
         session = Path(manifest.session)
-    return KeptResults(body, source, motions, hashes, loads, cutoffs, session, settings)
+    return KeptResults(body, source, motions, hashes, loads, cutoffs, corrections, session, settings)
 
 
 def doubt_told(folder: Path, written: Path, said: str) -> tuple[Path, str]:
@@ -232,12 +236,14 @@ def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
         raise TrialRefused(
             f"Trial {name}: {trial.source.path} has changed since the results were made. Run the session again."
         )
+    trial = corrected_trial(trial, kept.corrections)
     filtered = replace(trial, settings=trial.settings.changed({"filter.cutoff": kept.cutoffs[name]}))
     ready, motion = prepare_trial(filtered), kept.motions[name]
-    # the same recording, filtered alike, sums to the same wrench unless its plates were corrected
+    # the same recording, corrected and filtered alike, sums to the same wrench unless more was undone in it
     if not np.allclose(_load(ready.trial), kept.loads[name], rtol=1e-6, atol=1e-3):
         raise TrialRefused(
-            f"Trial {name}: its plates were corrected when the results were made (a lab.toml). Give the session folder."
+            f"Trial {name}: its plates were corrected when the results were made (a lab.toml, or a fault that was "
+            "undone). Give the session folder."
         )
     one = TrialResult(ready.trial, ready.steps, motion=motion)
     contact = contact_of(one, kept.body)
