@@ -67,20 +67,19 @@ def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> 
     sizes["trunk_length"] = lengths["trunk_head"]
     upright = _Upright(middle + rotation @ (local * [1.0, 1.0, 0.0]), np.cross(UP, right), right, sizes)
     unseen, notes = _trunk(mark, upright)
-    hidden: list[str] = []
-    for side in SIDES:
-        hidden += _arm(mark, upright, side)
+    # Arms hang on the trunk: where it is held, nobody knows where their shoulders are.
+    hidden = [side for side in SIDES if _arm(mark, upright, side, held=bool(unseen))]
     # Markers of what is carried stiffly would turn what carries it.
     segments = {f"{side}_{part}" for side in hidden for part in _ARM} | ({"trunk_head"} if unseen else set())
     worn = {marker.label for marker in posture.marker_set.markers if marker.segment in segments}
     points = {label: place for label, place in posture.points.items() if label not in worn}
-    unseen += [joint for side in hidden for joint in _ARM_JOINTS[side]]
-    if hidden:
+    if hidden and not unseen:
         notes.append(
             f"The {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
             "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
             "the table. How arms swing is not in the simulated wrench."
         )
+    unseen += [joint for side in hidden for joint in _ARM_JOINTS[side]]
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
 
 
@@ -120,18 +119,18 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
         return [], [f"The acromia have no markers: shoulders placed by proportion from {', '.join(thorax)}."]
     return ["trunk"], [
         "The trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
-        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is "
-        "not in the simulated wrench, so horizontal forces and moments prove little."
+        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean, turn and "
+        "swing is not in the simulated wrench, so horizontal forces and moments prove little."
     ]
 
 
-def _arm(mark: dict[str, Array], upright: _Upright, side: str) -> list[str]:
-    """Put the landmarks of an arm that is not seen, hanging straight; return the side if it is not seen."""
+def _arm(mark: dict[str, Array], upright: _Upright, side: str, *, held: bool) -> bool:
+    """Put the landmarks of an arm that is not seen, or ``held`` with its trunk, hanging straight; return whether."""
     radial, ulnar = f"{side}_wrist_radial", f"{side}_wrist_ulnar"
     wrist = [mark[name] for name in (radial, ulnar) if name in mark]
-    if f"{side}_elbow_lateral" in mark and wrist:
+    if f"{side}_elbow_lateral" in mark and wrist and not held:
         mark |= {radial: mark.get(radial, wrist[0]), ulnar: mark.get(ulnar, wrist[0])}
-        return []
+        return False
     out = SIGN[side] * upright.right
     under = upright.usual(f"{side}_acromion") @ UP
     elbow = mark[f"{side}_acromion"] - under * UP - upright.sizes["upper_arm_length"] * UP
@@ -143,7 +142,7 @@ def _arm(mark: dict[str, Array], upright: _Upright, side: str) -> list[str]:
         ("wrist_ulnar", upright.sizes["forearm_length"], -half / 2),
     ):
         mark[f"{side}_{name}"] = elbow - height * UP + across * out
-    return [side]
+    return True
 
 
 _ANKLE_HEIGHT = (0.04, 0.12)
