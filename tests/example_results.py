@@ -128,7 +128,7 @@ def full_session() -> SessionResult:
         Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",)
     )
     return SessionResult(
-        session, Placed(None, "Scaled on static."), (), (result,), (mass,), result.standing,
+        session, Placed(None, "Scaled on static."), (Step("scale", "done"),), (result,), (mass,), result.standing,
         weighed=Weighing(65.2, 0.1, WeighedBy.STANDING, ("walk <1>",)),
     )  # fmt: skip
 

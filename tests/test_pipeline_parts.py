@@ -174,13 +174,18 @@ def standing(mass: float, ahead: float = 0.0) -> QuietStanding:
     )
 
 
-def weighing(mass: float) -> Weighing:
-    return Weighing(mass, 0.1, WeighedBy.STANDING, ("s",))
+def weighing(mass: float, sd: float = 0.1) -> Weighing:
+    return Weighing(mass, sd, WeighedBy.STANDING, ("s",))
 
 
-@pytest.mark.parametrize(("mass", "inside"), [(60.0, True), (61.1, True), (61.3, False), (58.7, False)])
-def test_the_mass_check_allows_two_percent(mass, inside):
-    assert [check.inside for check in mass_check(SUBJECT, weighing(mass), CheckLimits())] == [inside]
+@pytest.mark.parametrize(
+    ("mass", "sd", "inside"),
+    [(60, 0.1, True), (61.1, 0.1, True), (61.3, 0.1, True), (61.3, 0.04, False), (58.5, 0.1, False), (62.7, 1.5, True)],
+)
+def test_the_mass_check_allows_two_percent_and_what_the_weighing_is_unsure_by(mass, sd, inside):
+    (check,) = mass_check(SUBJECT, weighing(mass, sd), CheckLimits())
+    assert check.inside is inside
+    assert check.advice.startswith(f"{mass:.1f} ± {1.96 * sd:.1f} kg by ")
 
 
 def test_what_is_not_known_is_not_checked():
@@ -207,3 +212,12 @@ def test_the_checks_of_a_trial_name_what_is_outside():
     ]
     assert rows["markers not seen"].value == "6.0 %"
     assert rows["fully measured"].value == "2.09 s"
+
+
+def test_markers_calibrated_on_a_frame_of_movement_may_lie_a_root_of_two_farther():
+    fit = MarkerFit(("A",), np.array([0.025]), np.array([0.12]), 0.025, 0.12)
+    result = TrialResult(trial("walk"), (Step("compare", "done"),), (), fit, None, None)
+    rows = {on: {check.what: check for check in trial_checks(result, 60.0, on_a_frame=on)} for on in (False, True)}
+    assert [rows[on]["marker distance, RMS"].inside for on in (False, True)] == [False, True]
+    assert rows[True]["marker distance, RMS"].limit == "at most 28.28 mm"
+    assert rows[True]["marker distance, largest"].inside

@@ -129,6 +129,20 @@ def test_a_broken_limit_leads_whatever_else_nobody_can_tell(reason: Reason) -> N
     assert "15.0 % of weight" in reconcile_with_checks(unsure, replace(CALM, checks=(check,)), ()).attention[0].text
 
 
+def test_what_lies_far_from_a_body_of_stature_alone_is_no_sign_of_a_fault_but_its_weight_is() -> None:
+    far = Check("marker distance, RMS", "walk", "31 mm", "at most 20 mm", False, "Look at it.")
+    heavy = Check("mass on the plates against declared", "walk", "9.0 ± 0.4 %", "at most 2 %", False, "Weigh again.")
+    unscaled = replace(CALM, steps=())
+    for result, check, begins in (
+        (CALM, far, "Something is wrong: markers of walk lie 31 mm"),
+        (unscaled, far, "Nobody can tell whether anything is wrong: the body comes from stature alone."),
+        (unscaled, heavy, "Something is wrong: the weight on the plates in walk is 9.0 ± 0.4 %"),
+    ):
+        found = reconcile_with_checks(WHOLE, replace(result, checks=(check,)), (STATIC,))
+        assert found.verdict == "unexplained"
+        assert found.attention[0].text.startswith(begins)
+
+
 @pytest.mark.parametrize(
     ("verdict", "judged", "then"),
     [

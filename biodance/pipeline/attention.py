@@ -217,14 +217,14 @@ def _not_clean(
     result: SessionResult, judged: tuple[Judged, ...], outside: tuple[Check, ...]
 ) -> dict[Reason, tuple[str, ...]]:
     """Return why nobody may say that nothing is wrong, each reason with what it concerns."""
-    broken = tuple(
-        said.format(one.where, one.value)
-        for one in outside
-        for what, said in _BROKEN.items()
-        if one.what.startswith(what)
-    )
-    doubts = tuple(one.fact for one in result.doubts if not one.mended)
-    why = {Reason.LIMIT_BROKEN: broken, Reason.BODY_DOUBTFUL: doubts}
+    # What lies far from a body of stature alone, or moves otherwise, is no sign of a fault: it fits nobody.
+    why: dict[Reason, tuple[str, ...]] = {Reason.LIMIT_BROKEN: (), Reason.BODY_NOT_SCALED: ()}
+    for one in outside:
+        for what, said in _BROKEN.items():
+            if one.what.startswith(what):
+                reason = Reason.LIMIT_BROKEN if result.scaled or what is CheckKind.WEIGHT else Reason.BODY_NOT_SCALED
+                why[reason] += (said.format(one.where, one.value),)
+    why[Reason.BODY_DOUBTFUL] = tuple(one.fact for one in result.doubts if not one.mended)
     # Only standing was judged of a session that holds movement, not even by its steps.
     static = static_trials(result)
     moved = any(row.seconds > 0 for row in judged if row.trial not in static)

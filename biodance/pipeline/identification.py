@@ -1,5 +1,6 @@
 """A session's masses, stage by stage, what they are worth on kept trials, an added load; and the quality table."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -67,27 +68,33 @@ def _upper(what: str, where: str, value: float, limit: float, unit: str, advice:
     inside = bool(value <= limit)
     # as few digits as leave the printed value on the same side of its limit
     digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
-    return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:g} {unit}", inside, advice)
+    return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:.4g} {unit}", inside, advice)
 
 
-def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, advice: str) -> list[Check]:
-    """Hold the markers of legs, trunk, arms and head each against their own limit; the one nearest to it speaks."""
-    allowed = {group: getattr(limits, f"marker_{group}") for group in ("legs", "trunk", "arms", "head")}
+def _group_check(
+    by_group: Mapping[str, float], name: str, limits: CheckLimits, more: float, advice: str
+) -> list[Check]:
+    """Hold the markers of legs, trunk, arms and head each against so much ``more`` than their own limit; the one
+    nearest to it speaks.
+    """
+    allowed = {group: more * getattr(limits, f"marker_{group}") for group in ("legs", "trunk", "arms", "head")}
     worst = max(by_group, key=lambda group: by_group[group] / allowed[group], default="")
     if not worst:
         return []
-    said = ", ".join(f"{group} {1000 * limit:g}" for group, limit in allowed.items())
+    said = ", ".join(f"{group} {1000 * limit:.4g}" for group, limit in allowed.items())
     value = f"{1000 * by_group[worst]:.1f} mm, {worst}"
     return [Check(_GROUPS, name, value, f"at most {said} mm", by_group[worst] <= allowed[worst], advice)]
 
 
 def mass_check(subject: Subject, weighed: Weighing | None, limits: CheckLimits) -> list[Check]:
-    """Compare the mass on the plates with the declared mass, where both are known."""
+    """Compare the mass on the plates, by its 95 % interval, with the declared mass, where both are known."""
     if weighed is None or not np.isfinite(subject.declared_mass):
         return []
     difference = abs(100 * (weighed.mass / subject.mass - 1))
-    advice = f"{weighed.mass:.1f} ± {weighed.sd:.1f} kg by {weighed.by.value}: weigh again, or check the plates' zero."
-    return [_upper(_MASS, ", ".join(weighed.trials), difference, limits.mass, "%", advice)]
+    unsure, kilograms = 196 * weighed.sd / subject.mass, f"{weighed.mass:.1f} ± {1.96 * weighed.sd:.1f} kg"
+    advice = f"{kilograms} by {weighed.by.value}: weigh again, or check the plates' zero."
+    said, limit = f"{difference:.1f} ± {unsure:.1f} %", f"at most {limits.mass:g} %"
+    return [Check(_MASS, ", ".join(weighed.trials), said, limit, bool(difference - unsure <= limits.mass), advice)]
 
 
 def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
@@ -100,15 +107,19 @@ def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[
     return [_upper(what, standing.trial, distance, 1000 * limits.standing, "mm", advice)]
 
 
-def trial_checks(result: TrialResult, mass: float) -> list[Check]:
-    """Check marker distances, gaps, measured frames and forces of one trial of a body of ``mass`` kg."""
+def trial_checks(result: TrialResult, mass: float, *, on_a_frame: bool = False) -> list[Check]:
+    """Check marker distances, gaps, measured frames and forces of one trial of a body of ``mass`` kg; ``on_a_frame``:
+    its markers lie where a frame of movement had them, which adds what skin does there to what it does elsewhere.
+    """
     name, limits, found = result.trial.name, result.trial.settings.checks, []
+    # Two independent errors of one size where the static trial has none.
+    more = math.sqrt(2) if on_a_frame else 1.0
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
         far = (result.fit.total_rms, limits.marker_rms), (result.fit.total_max, limits.marker_largest)
         for what, (size, limit) in zip(_MARKERS, far, strict=True):
-            found.append(_upper(what, name, 1000 * size, 1000 * limit, "mm", advice))
-        found += _group_check(result.fit.by_group, name, limits, advice)
+            found.append(_upper(what, name, 1000 * size, 1000 * more * limit, "mm", advice))
+        found += _group_check(result.fit.by_group, name, limits, more, advice)
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
         advice = "See the gaps: which segment lost its markers?"
@@ -189,7 +200,7 @@ def with_weighed_mass(session: Session) -> Session:
     found = None if np.isfinite(session.subject.mass) else weigh(session, None)
     if found is None:
         return session
-    said = f"{found.mass:.1f} ± {found.sd:.1f} kg were weighed by {found.by.value} in {', '.join(found.trials)}."
+    said = f"{found.mass:.1f} ± {1.96 * found.sd:.1f} kg were weighed by {found.by.value} in {', '.join(found.trials)}."
     return replace(session, subject=replace(session.subject, mass=found.mass), notes=(*session.notes, said))
 
 

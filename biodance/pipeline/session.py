@@ -29,7 +29,7 @@ from biodance.pipeline.identification import (
     with_weighed_mass,
 )
 from biodance.pipeline.results import Placed, SessionResult
-from biodance.pipeline.trial import Step, TrialResult, attempt, examine_trial, prepare_trial
+from biodance.pipeline.trial import ON_A_FRAME, Step, TrialResult, attempt, examine_trial, prepare_trial
 from biodance.records import Markers, Session
 from biodance.threads import one_thread
 
@@ -45,7 +45,7 @@ def _stop(what: str) -> Step:
 
 def _examined(
     read: tuple[TrialResult, ...],
-    body: Body | None,
+    placed: Placed,
     mass: float,
     earlier: tuple[TrialResult | None, ...],
     tell: Callable[[str], None],
@@ -55,10 +55,11 @@ def _examined(
     try:
         for k, (one, before) in enumerate(zip(read, earlier, strict=True), 1):
             tell(f"tracking {one.trial.name}, {k} of {len(read)}")
-            results.append(examine_trial(one, body, mass=mass, before=before))
+            results.append(examine_trial(one, placed.body, mass=mass, before=before))
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
-    return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
+    moving = any(step.name == ON_A_FRAME for step in placed.steps)
+    return tuple(replace(one, checks=tuple(trial_checks(one, mass, on_a_frame=moving))) for one in results)
 
 
 def _placed(
@@ -192,7 +193,7 @@ def followed(
         refuse_another_reference(reference.identification.body, body, mass, reference.name)
     # the same body follows the same markers as before: what it did is not computed again
     same = earlier.trials if earlier and placed is earlier.placed else tuple(repeat(None, len(read)))
-    done = _examined(read, body, mass, same, tell)
+    done = _examined(read, placed, mass, same, tell)
     steps, standing, limits = list(placed.steps), best_standing(done), session.settings.checks
     weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
     return SessionResult(
