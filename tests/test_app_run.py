@@ -40,9 +40,22 @@ def test_a_run_goes_through_its_sessions_and_what_is_done_is_fresh(archive):
     assert (told["state"], told["done"]) == (RunState.FINISHED, 2)
     found = {row["name"]: row["found"] for row in archive.rows()}
     assert found["s0"]["status"] == "done"
+    assert not found["s0"]["page"]  # the stand-in draws none
     assert found["s2"] is None
     (archive["s0"].folder / "session.toml").write_text("[subject]\nage = 30\n")
     assert not archive["s0"].found()["fresh"]
+
+
+def test_who_asks_how_a_run_stands_is_answered_as_soon_as_it_ends(archive):
+    worker = Worker(archive, count)
+    worker.wait(60)  # nothing is at work
+    worker.start([archive["s0"], archive["s1"]])
+    worker.wait(0.001)
+    assert worker.running
+    began = time.monotonic()
+    worker.wait(600)
+    assert time.monotonic() - began < 300
+    assert worker.document()["state"] is RunState.FINISHED
 
 
 def test_what_is_said_of_the_subject_in_the_folder_above_makes_results_old(archive):

@@ -42,7 +42,7 @@ from biodance.report.tables.session import (
     results_document,
     write_session_tables,
 )
-from biodance.report.wording import format_number
+from biodance.report.wording import DIAGNOSED, format_number
 
 METHODS = "methods.md"
 REFERENCES: Mapping[str, str] = {
@@ -236,7 +236,7 @@ CLAUSES: tuple[MethodClause, ...] = (
         "Joint moments (of the muscles) and powers were computed by inverse dynamics with the {} parameters and "
         "divided by {:.1f} kg.",
     ),
-    MethodClause("diagnosis/verdict", "The automatic diagnosis of the recording ended with the verdict “{}”."),
+    MethodClause("diagnosis/verdict", lambda one: f"The automatic diagnosis of the recording {DIAGNOSED[one]}."),
 )
 """In the order in which they are said."""
 
