@@ -2,7 +2,10 @@
 
 import fcntl
 import os
+import select
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -133,6 +136,17 @@ def test_a_process_made_ready_does_every_run_and_is_replaced_once_it_was_killed(
     told = ended(worker)
     assert (told["state"], told["done"], told["why"]) == (RunState.FINISHED, 1, "")
     assert archive["s2"].found()["status"] == "done"
+
+
+def test_ctrl_c_ends_a_window_as_it_should(archive, tmp_path):
+    command = [sys.executable, "-m", "biodance", "app", str(archive.folder), "--no-browser", "--out", tmp_path / "out"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as window:
+        assert select.select([window.stdout], [], [], 120.0)[0]
+        window.send_signal(signal.SIGINT)
+        _, said = window.communicate(timeout=60)
+    assert window.returncode == 0
+    assert "Ctrl-C ends it" in said
+    assert "Stopped" not in said
 
 
 def test_while_a_batch_writes_there_a_run_says_so(archive):
