@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -15,9 +16,20 @@ from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.trial import Check
 from biodance.pipeline.words import say_load
 from biodance.records.attention import Attention, told_together
+from biodance.report import wording
 from biodance.report.figures.vector import round_ticks
 from biodance.report.pages.movement import _beside
-from biodance.report.wording import DIAGNOSED, causes_by_effect, changed, moment, share_of, signed, size_seen, sized
+from biodance.report.wording import (
+    DIAGNOSED,
+    IN_SHORT,
+    causes_by_effect,
+    changed,
+    moment,
+    share_of,
+    signed,
+    size_seen,
+    sized,
+)
 from biodance.report.write import CLAUSES, REFERENCES, methods_text
 
 
@@ -238,6 +250,8 @@ def test_without_its_key_a_clause_goes_and_only_those_of_that_key(number, path):
 
 def test_every_verdict_is_said_in_words():
     assert sorted(DIAGNOSED) == sorted(get_args(Verdict))
+    window = (Path(wording.__file__).parents[1] / "app" / "static" / "dom.js").read_text().replace('"', "")
+    assert all(f"{verdict}: [{said}," in window for verdict, said in IN_SHORT.items())
     text = methods_text({"diagnosis": {"verdict": "named, incomplete"}})
     assert "named causes of some of what it found, and left other differences without a cause." in text
 

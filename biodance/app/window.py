@@ -218,8 +218,8 @@ def keep_acceptance(place: SessionPlace, out: Path) -> Path:
 
 DROPPED = "dropped"
 """Folder of copies of what was dropped on a window, in that of the results."""
-_SANDBOX = "sandbox allow-scripts allow-popups allow-modals; frame-ancestors 'self'"
-"""What a page of results may do in a tab: run its own scripts, and reach nothing of the window's."""
+_SANDBOX = "sandbox allow-scripts allow-popups allow-modals allow-downloads; frame-ancestors 'self'"
+"""What a page of results may do in a tab: run its own scripts, save a figure, and reach nothing of the window's."""
 
 
 @dataclass(frozen=True)

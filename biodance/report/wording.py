@@ -20,6 +20,12 @@ DIAGNOSED = {
     "unexplained": "found differences for which it could name no cause",
 }
 """What a diagnosis came to, by its verdict."""
+IN_SHORT = {
+    "named, complete": "cause found",
+    "named, incomplete": "cause found, more is open",
+    "unexplained": "cause not known",
+}
+"""The same in a cell of a table, where the verdict itself does not say it."""
 _NAMED = 6  # Targets of a cause that are listed by name
 
 

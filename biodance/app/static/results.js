@@ -41,7 +41,7 @@ function frame(name, part, title) {
   return h("iframe", {
     src: `/page?${new URLSearchParams({ name, part })}`,
     title,
-    sandbox: "allow-scripts allow-popups",
+    sandbox: "allow-scripts allow-popups allow-downloads",
   });
 }
 
