@@ -2,7 +2,10 @@
 
 import fcntl
 import os
+import select
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -40,9 +43,22 @@ def test_a_run_goes_through_its_sessions_and_what_is_done_is_fresh(archive):
     assert (told["state"], told["done"]) == (RunState.FINISHED, 2)
     found = {row["name"]: row["found"] for row in archive.rows()}
     assert found["s0"]["status"] == "done"
+    assert not found["s0"]["page"]  # the stand-in draws none
     assert found["s2"] is None
     (archive["s0"].folder / "session.toml").write_text("[subject]\nage = 30\n")
     assert not archive["s0"].found()["fresh"]
+
+
+def test_who_asks_how_a_run_stands_is_answered_as_soon_as_it_ends(archive):
+    worker = Worker(archive, count)
+    worker.wait(60)  # nothing is at work
+    worker.start([archive["s0"], archive["s1"]])
+    worker.wait(0.001)
+    assert worker.running
+    began = time.monotonic()
+    worker.wait(600)
+    assert time.monotonic() - began < 300
+    assert worker.document()["state"] is RunState.FINISHED
 
 
 def test_what_is_said_of_the_subject_in_the_folder_above_makes_results_old(archive):
@@ -120,6 +136,17 @@ def test_a_process_made_ready_does_every_run_and_is_replaced_once_it_was_killed(
     told = ended(worker)
     assert (told["state"], told["done"], told["why"]) == (RunState.FINISHED, 1, "")
     assert archive["s2"].found()["status"] == "done"
+
+
+def test_ctrl_c_ends_a_window_as_it_should(archive, tmp_path):
+    command = [sys.executable, "-m", "biodance", "app", str(archive.folder), "--no-browser", "--out", tmp_path / "out"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as window:
+        assert select.select([window.stdout], [], [], 120.0)[0]
+        window.send_signal(signal.SIGINT)
+        _, said = window.communicate(timeout=60)
+    assert window.returncode == 0
+    assert "Ctrl-C ends it" in said
+    assert "Stopped" not in said
 
 
 def test_while_a_batch_writes_there_a_run_says_so(archive):

@@ -18,6 +18,7 @@ from biodance.app.sessions import Archive
 from biodance.app.window import Window
 from biodance.errors import BiodanceError
 from biodance.library import names
+from biodance.report.pages.template import template_text, three_js
 
 PORT, TOKEN = 8123, "a-token"
 HOME = f"http://127.0.0.1:{PORT}"
@@ -323,6 +324,18 @@ def test_a_part_of_the_page_stands_alone_and_can_do_nothing_to_the_window(user, 
     assert answer.headers["content-security-policy"].startswith("sandbox ")
     assert "nothing to show" in user.get("/page", params={"name": NAME, "part": "body"}).text
     assert user.get("/page", params={"name": NAME}).text == text.format("movement")
+
+
+def test_a_browser_builds_the_picture_in_space_only_where_it_is_shown(user, archive):
+    folder = archive[NAME].results
+    folder.mkdir(parents=True)
+    scripts = "".join(f"<script>{text}</script>" for text in (template_text("curves.js"), three_js()))
+    text = f'<html><head></head><body><section id="movement"></section><section id="replay"></section>{scripts}</body>'
+    (folder / "report.html").write_text(text, encoding="utf-8")
+    drawn = {part: user.get("/page", params={"name": NAME, "part": part}).text for part in ("gait", "body")}
+    assert three_js() not in drawn["gait"]
+    assert template_text("curves.js") in drawn["gait"]
+    assert three_js() in drawn["body"]
 
 
 @pytest.mark.parametrize("out", [".", "archive", "archive/S02/.."])

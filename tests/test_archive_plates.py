@@ -19,8 +19,8 @@ from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, plate_places
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
-from biodance.pipeline.learn import judge_plates
-from biodance.report.laboratory import QUANTITY_TITLES, plate_figure
+from biodance.pipeline.learn import PlatesJudged, judge_plates
+from biodance.report.laboratory import QUANTITY_TITLES, plate_figure, plates_document, plates_page
 
 WEIGHT = 600.0
 
@@ -60,6 +60,18 @@ def test_one_strange_visit_is_no_change_of_the_plate():
     found = judge_archive(odd)
     assert not changes(found)
     assert {one.visit for one in found.strangers if one.quantity == "offset_z"} == {"V09"}
+
+
+def test_a_visit_that_differs_by_nothing_that_matters_is_not_told():
+    """Plates whose zero was taken off agree so well that a hundredth of a newton is sure, and means nothing."""
+    quiet = [
+        replace(one, value=1e-4 * one.value + 0.01 * (one.visit.name == "V09"), sd=1e-4 * one.sd)
+        for one in draw(4)
+        if one.quantity == "offset_z"
+    ]
+    found = judge_archive(quiet)
+    assert any(one.visit == "V09" for some in found.histories for one in some.strangers)
+    assert found.strangers == ()
 
 
 def test_whoever_stands_for_long_shows_a_zero_better():
@@ -160,6 +172,20 @@ def test_the_index_knows_conditions_and_leaves_out_what_is_not_there(balance):
     assert len(rows) == 16
     assert rows[1].conditions == {"surface": "foam"}
     assert rows[0].mass == pytest.approx(WEIGHT / 9.80665 + 0.05, abs=1e-3)
+
+
+def test_one_visit_judges_no_plate_and_says_so():
+    """A gain of -22 % of a plate that one visit saw (FMC) may be its foot; "nothing wrong" would be false, too."""
+    judged = judge_archive([one for one in draw(4) if one.visit.name == "V01"])
+    assert not judged.findings
+    found = PlatesJudged(Path("lab"), judged, (), {})
+    document = plates_document(found)
+    (note,) = document["notes"]
+    assert note.endswith("not judged, as one visit cannot tell a plate's fault from a person's. Report the session.")
+    page = plates_page(found, document)
+    assert "The plates of lab: none can be judged yet" in page
+    assert "1 visit of" in page
+    assert "Nothing wrong" not in page
 
 
 def test_text_without_channels_or_with_a_strange_unit_is_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,22 @@ def test_the_scores_stand_on_the_page_beside_their_reference() -> None:
     assert "Distance from the healthy mean of 3 people" in text
     assert "gait deviation index (100 = healthy)" in text
     assert "normal, 3 people" in text
+
+
+def test_scores_of_plug_in_gait_are_of_the_steps_that_the_files_hold() -> None:
+    """HC031A: of one of two steps the file's pelvis is told against another axis; 1.8 deg, by the other step alone."""
+    healthy = [person("a", 1.0), person("b", 2.0), person("c", 6.0)]
+    found = healthy_reference(healthy, healthy)
+    first, second = cycle(0), cycle(1)
+    three, nine = (dict.fromkeys(SCORE_ANGLES, size) for size in (6.0, 12.0))
+    here = (*level_gait(first, **three), *level_gait(second, **nine))
+    walk = replace(trial("walk", [*here]), file_curves=here[: len(SCORE_ANGLES)], conventional_curves=here)
+    reference = replace(found, beside=found.normal)
+    scores = SessionMovement("visit", (walk,), "table", 60.0, {}, healthy=reference).scores
+    assert [one.gps["right"].count for one in scores] == [2, 1, 1]
+    assert scores[1].gps["right"].mean == scores[2].gps["right"].mean == pytest.approx(3.0)
+    walk = replace(walk, file_curves=())
+    assert SessionMovement("visit", (walk,), "table", 60.0, {}, healthy=reference).scores[2].gps["right"].count == 2
 
 
 def test_a_session_that_is_not_there_is_named_with_those_that_are(tmp_path) -> None:

@@ -2,6 +2,7 @@
 
 import base64
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -38,6 +39,29 @@ def test_a_part_of_the_time_still_shows_the_whole_band(tmp_path):
         assert min(above, below) >= 0
         numbers = "[...document.querySelectorAll('text[text-anchor=end]')].map(one => one.textContent)"
         assert len(browser.run(numbers)) >= 2
+
+
+KEPT = """new Promise((done) => {
+    URL.createObjectURL = (blob) => { blob.text().then(done); return "data:,"; };
+    document.querySelector('.zoom button[aria-label*="WHAT"]').click();
+})"""
+"""What a button of a figure saves."""
+
+
+def test_a_figure_is_saved_as_it_is_seen_and_its_values_as_a_table(tmp_path):
+    curves = [Curve("right", TIME**2, Stroke(BLUE)), Curve("left", TIME, Stroke(BLUE))]
+    figure = CurveFigure(TIME, [[Strip("moment (N·m)", curves)]], "about")
+    with Page(written(tmp_path, figure.html(), template_text("curves.css"))) as browser:
+        browser.run("document.querySelector('.legend button[data-name=left]').click()")
+        drawn = ElementTree.fromstring(browser.run(KEPT.replace("WHAT", "SVG")))
+        assert {"moment (N·m)", "right"} <= {one.text for one in drawn.iter("{http://www.w3.org/2000/svg}text")}
+        assert "non-scaling-stroke" in drawn[0].text
+        header, *rows = browser.run(KEPT.replace("WHAT", "CSV")).strip().split("\n")
+        assert header == "panel,curve,along,value"
+        assert len(rows) == TIME.size
+        panel, curve, along, value = rows[100].rsplit(",", 3)
+        assert (panel, curve) == ('"moment (N·m)"', '"right"')
+        assert (float(along), float(value)) == pytest.approx((5.0, 25.0), abs=0.05)
 
 
 def test_bars_and_legends_are_printed_with_their_colours(tmp_path):

@@ -2,6 +2,8 @@
 
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,13 +11,25 @@ from example_results import full_session, html_of
 from found_loads import GAIN, NOTHING, OWN, found
 from identified_sessions import session_result
 
+from biodance.diagnosis.diagnosis import Verdict
 from biodance.pipeline.diagnosis import as_diagnosed
 from biodance.pipeline.trial import Check
 from biodance.pipeline.words import say_load
 from biodance.records.attention import Attention, told_together
+from biodance.report import wording
 from biodance.report.figures.vector import round_ticks
 from biodance.report.pages.movement import _beside
-from biodance.report.wording import causes_by_effect, changed, moment, share_of, signed, size_seen, sized
+from biodance.report.wording import (
+    DIAGNOSED,
+    IN_SHORT,
+    causes_by_effect,
+    changed,
+    moment,
+    share_of,
+    signed,
+    size_seen,
+    sized,
+)
 from biodance.report.write import CLAUSES, REFERENCES, methods_text
 
 
@@ -202,7 +216,7 @@ SAID = [
     "19.5 N with the table and 12.5 N",
     "3 gait cycles, 1 squat",
     "the identified parameters and divided by 45.7 kg",
-    "“nothing wrong”",
+    "diagnosis of the recording found nothing wrong",
 ]
 KEYS = [(number, path) for number, clause in enumerate(CLAUSES) for path in clause.keys]
 
@@ -232,6 +246,14 @@ def test_without_its_key_a_clause_goes_and_only_those_of_that_key(number, path):
     for k, clause in enumerate(CLAUSES):
         assert (SAID[k] in text) == (path not in clause.keys), SAID[k]
     assert SAID[number] not in text
+
+
+def test_every_verdict_is_said_in_words():
+    assert sorted(DIAGNOSED) == sorted(get_args(Verdict))
+    window = (Path(wording.__file__).parents[1] / "app" / "static" / "dom.js").read_text().replace('"', "")
+    assert all(f"{verdict}: [{said}," in window for verdict, said in IN_SHORT.items())
+    text = methods_text({"diagnosis": {"verdict": "named, incomplete"}})
+    assert "named causes of some of what it found, and left other differences without a cause." in text
 
 
 def test_references_go_with_the_clauses_that_cite_them():

@@ -146,7 +146,7 @@ def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(resul
         assert "You walked 1.2 metres in a second. That is 4.3 kilometres an hour." in html
         assert "You made 120 steps in a minute." in html
         assert "Your right knee bends 10 degrees more than the other one." in html
-        assert html.index("How you walked") < html.index("What your body parts weigh</h2>")
+        assert html.index("How you walked") < html.index("What the parts of your body weigh</h2>")
         assert '<svg class="panel"' in html
         assert "Gait Lab" in html[html.index("What this is not") :]
         assert grade(html) <= 7
@@ -177,4 +177,4 @@ def test_the_command_writes_it_beside_the_report(result, tmp_path, monkeypatch, 
     monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
     told = run(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--subject-page", "--json"])
     assert told in (DONE, NEEDS_A_PERSON)
-    assert "What your body parts weigh" in (tmp_path / "out" / "subject.html").read_text(encoding="utf-8")
+    assert "What the parts of your body weigh" in (tmp_path / "out" / "subject.html").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -258,13 +258,16 @@ class SessionPlace:
         return SessionTask(self.name, folder, out, fingerprint_of(self.folder, ()), tables=True)
 
     def found(self) -> dict[str, Any] | None:
-        """Return what the last run made of the session, and whether of its present files (``fresh``); or None."""
+        """Return what the last run made of the session; whether of its present files (``fresh``), and whether it wrote
+        ``tables`` and a ``page``; None where it was not run.
+        """
         try:
             told = parse_json((self.results / OUTCOME).read_text(encoding="utf-8"))
             row: dict[str, Any] = next(iter(told["rows"]), {})
             found = {"status": str(told["status"]), "reason": str(told["reason"]), "verdict": row.get("verdict") or ""}
-            fresh = told["fingerprint"] == fingerprint_of(self.folder, ())
-            return found | {"fresh": fresh, "tables": (self.results / TABLES).is_dir()}
+            found["fresh"] = told["fingerprint"] == fingerprint_of(self.folder, ())
+            there = {"tables": (self.results / TABLES).is_dir(), "page": (self.results / "report.html").is_file()}
+            return found | there
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
 
@@ -380,6 +383,10 @@ class Worker:
     def running(self) -> bool:
         """Whether a run is not finished."""
         return self._run is not None and self._run.state is RunState.RUNNING
+
+    def wait(self, seconds: float) -> None:
+        """Return as soon as no run is at work, or after so many s."""
+        wait([self._at_work] if self.running else [], timeout=seconds)
 
     def stop(self) -> None:
         """Stop the run; what is at work is killed, what is done stays. Returns when nothing works any more."""

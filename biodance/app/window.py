@@ -34,9 +34,11 @@ from biodance.lab.session.results_folder import check_results
 from biodance.library import parse_json
 from biodance.records import Trial
 from biodance.report.files import for_spreadsheets
+from biodance.report.pages.template import template_text, three_js
 from biodance.version import __version__
 
 _LONGEST = 600.0  # s that a program started for one download may take
+_PATIENCE = 0.3  # s that the answer to how a run stands waits for its end
 _MOST_ROWS = 20_000  # Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)
 _PARTS: Mapping[str, tuple[str, ...]] = {
     "gait": ("movement", "gait"),
@@ -89,6 +91,9 @@ def page_part(place: SessionPlace, part: str) -> str:
     kept = [one for one in _PARTS.get(part, ()) if f'<section id="{one}">' in page]
     if not kept:
         return _NOTHING
+    if "replay" not in kept:  # a browser would build the 3-D picture, which nobody sees there
+        for script in (three_js(), template_text("replay.js")):
+            page = page.replace(f"<script>{script}</script>", "")
     shown = ", ".join(f"#{one}" for one in kept)
     alone = f"body > header, main > :not({shown}) {{ display: none; }} body {{ padding-top: 0; }}"
     return page.replace("</head>", f"<style>{alone} h2 {{ margin-top: 1rem; }}</style></head>", 1)
@@ -213,8 +218,8 @@ def keep_acceptance(place: SessionPlace, out: Path) -> Path:
 
 DROPPED = "dropped"
 """Folder of copies of what was dropped on a window, in that of the results."""
-_SANDBOX = "sandbox allow-scripts allow-popups allow-modals; frame-ancestors 'self'"
-"""What a page of results may do in a tab: run its own scripts, and reach nothing of the window's."""
+_SANDBOX = "sandbox allow-scripts allow-popups allow-modals allow-downloads; frame-ancestors 'self'"
+"""What a page of results may do in a tab: run its own scripts, save a figure, and reach nothing of the window's."""
 
 
 @dataclass(frozen=True)
@@ -278,8 +283,11 @@ class Window:
         return self._viewed(self._place(asked)).document()
 
     def state(self, asked: Asked) -> dict[str, Any]:
-        """Return what may have changed meanwhile: the revision of session.toml, and the run."""
+        """Return what may have changed meanwhile: the revision of session.toml, and the run; one that is at work is
+        waited for, a little.
+        """
         name = asked.text("name")
+        self.worker.wait(_PATIENCE)
         return {"revision": self.archive[name].file.revision if name else "", "run": self.worker.document()}
 
     def edit(self, asked: Asked) -> dict[str, Any]:

@@ -149,10 +149,11 @@ def _page(
     from biodance.pipeline.saved_results import now
     from biodance.report.figures.style import svg_address
     from biodance.report.pages.template import print_sheet, render, template_text
-    from biodance.report.wording import signed
+    from biodance.report.wording import IN_SHORT, signed
 
     drawn, made = _figure(table), now()
     first = table.drop_duplicates("session").set_index("session")
+    verdicts = first["verdict"].dropna().replace(IN_SHORT)
     return render(
         "archive.html.j2",
         filters={"signed": signed},
@@ -162,10 +163,10 @@ def _page(
         outcomes=outcomes,
         unread=[one for one in outcomes if one.unread],
         counts=dict(sorted(Counter(one.status for one in outcomes).items())),
-        verdicts=first["verdict"].dropna().value_counts().to_dict(),
+        verdicts=verdicts.value_counts().to_dict(),
         findings=first.loc[first["findings"].fillna("") != "", "findings"].to_dict(),
         mass=first["mass_difference_percent"].dropna().to_dict(),
-        verdict=first["verdict"].dropna().to_dict(),
+        verdict=verdicts.to_dict(),
         strange=outliers(table),
         alike=alike,
         twice=twice,

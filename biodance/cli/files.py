@@ -1,7 +1,7 @@
 """Commands on a machine and what lies on its disk: app, doctor, init, register, inspect, settings, export, live."""
 
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -273,5 +273,6 @@ def app_command(
         sys.stdout.flush()
         shared.say(f"The window over {place} is open; its results go to {results}. Ctrl-C ends it.")
 
-    serve_window(place, results, port=port, opened=browser, tell=tell)
+    with suppress(KeyboardInterrupt):  # that is how a window ends
+        serve_window(place, results, port=port, opened=browser, tell=tell)
     return shared.DONE

@@ -298,15 +298,14 @@ class TrialMovement:
         """
         import pandas as pd
 
-        columns = ["kind", "quantity", "side", "unit", "percent", "count", "mean", "sd", "parameters_sd"]
-        rows = [
-            (one.kind, one.quantity, one.side, one.unit, float(percent), int(count), *values)
-            for one in self.groups
-            for percent, count, *values in zip(
-                cut.PERCENT, np.isfinite(one.values).sum(axis=0), one.mean, one.sd, one.parameters_sd, strict=True
-            )
-        ]
-        return pd.DataFrame(rows, columns=columns)
+        groups, each = self.groups, len(cut.PERCENT)
+        about = {name: [getattr(one, name) for one in groups] for name in ("kind", "quantity", "side", "unit")}
+        columns = {name: np.repeat(np.array(some, dtype=object), each) for name, some in about.items()}
+        columns["percent"] = np.tile(cut.PERCENT, len(groups))
+        columns["count"] = np.array([np.isfinite(one.values).sum(axis=0) for one in groups], dtype=int).ravel()
+        for name in ("mean", "sd", "parameters_sd"):
+            columns[name] = np.array([getattr(one, name) for one in groups], dtype=float).ravel()
+        return pd.DataFrame(columns)
 
     def spatiotemporal(self, side: str = "both") -> dict[str, tuple[float, float, int]]:
         """Return mean, sd and number of the spatio-temporal values.

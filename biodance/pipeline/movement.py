@@ -18,7 +18,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.body.human.conventional import ConventionalModel, conventional_model
 from biodance.cycles import TrialMovement
-from biodance.cycles.scores import GaitScores, gait_scores
+from biodance.cycles.scores import GaitScores, gait_scores, gait_vectors
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
@@ -99,12 +99,16 @@ class SessionMovement:
 
     @cached_property
     def scores(self) -> tuple[GaitScores | None, GaitScores | None, GaitScores | None]:
-        """Gait scores of our angles, the files', the conventional gait model's; None without a reference."""
+        """Gait scores of our angles, the files', and the conventional gait model's, over the cycles of which the files
+        hold all angles where there are any; None without a reference.
+        """
         if self.gait is None:
             return None, None, None
         ours = gait_scores(self.gait.curves, self.healthy.normal, self.healthy.deviation)
         beside = gait_scores(self.gait.file_curves, self.healthy.beside)
-        return ours, beside, gait_scores(self.gait.conventional_curves, self.healthy.beside)
+        same = gait_vectors(self.gait.file_curves)  # of the same steps, so that they can be compared
+        conventional = [one for one in self.gait.conventional_curves if not same or one.cycle in same]
+        return ours, beside, gait_scores(conventional, self.healthy.beside)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.

@@ -71,13 +71,15 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
 
 
 def for_spreadsheets(frame: "DataFrame") -> "DataFrame":
-    """Return a table with all its texts and headings as `for_spreadsheet`."""
+    """Return a table with all its texts and headings as `for_spreadsheet`; itself where none begins a formula."""
     from pandas.api.types import is_numeric_dtype
 
     # each text is looked at once: a trial's name stands in every frame's row
     some = (name for name in frame.columns if not is_numeric_dtype(frame[name]))
     formulas = (name for name in some if any(for_spreadsheet(cell) is not cell for cell in frame[name].unique()))
     texts = {name: frame[name].map(for_spreadsheet) for name in formulas}
+    if not texts and all(for_spreadsheet(name) is name for name in frame.columns):
+        return frame
     return frame.assign(**texts).rename(columns=for_spreadsheet)
 
 
@@ -96,13 +98,9 @@ def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path,
 
     plain, written = csv.WriteOptions(quoting_style="needed", quoting_header="needed"), []
     for name, frame in tables.items():
-        for ending in ENDINGS:
-            shown = for_spreadsheets(frame) if ending == ".csv" else frame
-            table = Table.from_pandas(shown, preserve_index=False)
-            path = folder / f"{name}{ending}"
-            if ending == ".csv":
-                csv.write_csv(table, path, plain)
-            else:
-                parquet.write_table(table, path)
-            written.append(path)
+        text, typed = (folder / f"{name}{ending}" for ending in ENDINGS)
+        table, shown = Table.from_pandas(frame, preserve_index=False), for_spreadsheets(frame)
+        csv.write_csv(table if shown is frame else Table.from_pandas(shown, preserve_index=False), text, plain)
+        parquet.write_table(table, typed)
+        written += [text, typed]
     return tuple(written)

@@ -71,6 +71,10 @@ _CONDITION = Schema(
 def plates_document(found: PlatesJudged) -> Row:
     """Return a card per plate, persons, what all share, and what was left out; null for an untold quantity."""
     judged = found.judgement
+    once = [card.plate for card in judged.plates if card.visits < 2]
+    alone = (
+        f"{', '.join(once)}: not judged, as one visit cannot tell a plate's fault from a person's. Report the session."
+    )
     return {
         "archive": found.archive.resolve().name,
         "visits": Schema("visit=name person date", {"date": lambda one: one.date or None}).rows(judged.visits),
@@ -83,7 +87,7 @@ def plates_document(found: PlatesJudged) -> Row:
             for one in card.findings
         ],
         "refused": dict(found.refused),
-        "notes": list(found.notes),
+        "notes": [*found.notes, *([alone] if once else ())],
     }
 
 
@@ -213,12 +217,13 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
     judged = found.judgement
     count, made, title = len(judged.findings), now(), f"The plates of {document['archive']}"
     dates = sorted(visit.date[:10] for visit in found.judgement.visits if visit.date)
+    seen = "nothing wrong was found" if any(card.visits > 1 for card in judged.plates) else "none can be judged yet"
     return render(
         "plates.html.j2",
         style=Markup(template_text("page.css")) + print_sheet(title, {}, made),
         name=document["archive"],
         created=made,
-        answer=f"{count} finding{'s' if count != 1 else ''}" if count else "nothing wrong to be seen",
+        answer=f"{count} finding{'s' if count != 1 else ''}" if count else seen,
         judged=judged,
         dates=(f", {dates[0]} to {dates[-1]}" if dates and len(dates) == len(found.judgement.visits) else ""),
         persons=[
@@ -229,7 +234,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         conditions=[(one, svg_address(condition_figure(one))) for one in judged.conditions],
         levels={card.plate: list(map(_level, card.levels)) for card in judged.plates},
         schemas={"level": _LEVEL, "person": _PERSON},
-        notes=found.notes,
+        notes=document["notes"],
         refused=found.refused,
     )
 

@@ -22,7 +22,7 @@ def loopback_socket(port: int, option: str) -> socket.socket:
     except (OSError, OverflowError) as error:
         listener.close()
         raise BiodanceError(
-            f"{option} {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
+            f"{option} {port}: this port of 127.0.0.1 cannot be used ({error}). Give another one, or 0 for any."
         ) from error
     return listener
 

@@ -13,6 +13,19 @@ from biodance.records.attention import Attention, told_together
 _ABSURD = 30.0  # Typical sizes above which a size from which something is seen means never
 NEVER = "never"
 """Said of such a size."""
+DIAGNOSED = {
+    "nothing wrong": "found nothing wrong",
+    "named, complete": "named the causes of all that it found",
+    "named, incomplete": "named causes of some of what it found, and left other differences without a cause",
+    "unexplained": "found differences for which it could name no cause",
+}
+"""What a diagnosis came to, by its verdict."""
+IN_SHORT = {
+    "named, complete": "cause found",
+    "named, incomplete": "cause found, more is open",
+    "unexplained": "cause not known",
+}
+"""The same in a cell of a table, where the verdict itself does not say it."""
 _NAMED = 6  # Targets of a cause that are listed by name
 
 

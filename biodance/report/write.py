@@ -9,7 +9,7 @@ from typing import Any
 
 from biodance.body.body import body_text
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
-from biodance.display import spaced
+from biodance.display import cause_in_words, spaced
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.plates.faults import APPLIED, PlateCorrection
@@ -42,7 +42,7 @@ from biodance.report.tables.session import (
     results_document,
     write_session_tables,
 )
-from biodance.report.wording import format_number
+from biodance.report.wording import DIAGNOSED, format_number
 
 METHODS = "methods.md"
 REFERENCES: Mapping[str, str] = {
@@ -236,7 +236,7 @@ CLAUSES: tuple[MethodClause, ...] = (
         "Joint moments (of the muscles) and powers were computed by inverse dynamics with the {} parameters and "
         "divided by {:.1f} kg.",
     ),
-    MethodClause("diagnosis/verdict", "The automatic diagnosis of the recording ended with the verdict “{}”."),
+    MethodClause("diagnosis/verdict", lambda one: f"The automatic diagnosis of the recording {DIAGNOSED[one]}."),
 )
 """In the order in which they are said."""
 
@@ -438,7 +438,7 @@ def _accepted_files(
     """Return by file its text and what it is: the body of a ``proven`` diagnosis, and the corrections that last."""
     files, body = {}, proven.accepted if proven else None
     if body is not None and body.status == "solved":
-        named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
+        named = ", ".join(cause_in_words(one.effect, one.target) for one in findings if one.changes)
         text = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
         files[BODY_FILE] = (text, f"the body identified with {named} accepted")
     if made and (text := lab_text(earlier, made)):

@@ -80,20 +80,22 @@ async function look() {
       delete document.getElementById("said").dataset.gone;
       say("");
     }
+    return true;
   } catch (error) {
     say(error.message);
     if (error.gone) document.getElementById("said").dataset.gone = "yes";
+    return false;
   }
 }
 
 let passed = 0,
   looking = false;
 setInterval(async () => {
-  // every 1.5 s, while something runs every 0.3 s: its page is there as soon as it is made
+  // every 1.5 s; while something runs, whose end an answer waits for, one question after the other
   passed += 1;
   if (looking || (passed % 5 && page.run?.state !== "running")) return;
   looking = true;
-  await look();
+  while ((await look()) && page.run?.state === "running");
   looking = false;
 }, 300);
 takeDrops(page);

@@ -7,39 +7,47 @@ import { textEditor } from "./session.js";
 
 const CHANNELS = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
 
-async function resultsOf({ panel, view, name, page }) {
+function hasRun({ panel, view, name, page }) {
+  // whether it was run, and what is to be known of that run
   const running = page.run?.state === "running" && page.run.names.includes(name);
   if (running) put(panel, h("p", { cls: "guess-word" }, "It runs now. What it finds comes here by itself."));
   if (!view.found) {
     if (!running) put(panel, h("p", {}, "This session has not been run yet. Press Run."));
-    return null;
+    return false;
   }
   if (!view.found.fresh && !running)
     put(panel, h("p", { cls: "guess-word" }, "Something changed since this run. Run again to see what it changes."));
+  return true;
+}
+
+async function resultsOf(all) {
+  if (!hasRun(all)) return null;
   try {
-    return await ask("results", { name });
+    return await ask("results", { name: all.name });
   } catch (error) {
-    put(panel, h("p", { cls: "warn" }, view.found.reason || error.message));
+    put(all.panel, h("p", { cls: "warn" }, all.view.found.reason || error.message));
     return null;
   }
+}
+
+function showPage(all, part, title) {
+  // part of the page that the last run drew; why there is none
+  if (!hasRun(all)) return;
+  const { reason, page } = all.view.found;
+  put(all.panel, page ? frame(all.name, part, title) : h("p", { cls: "warn" }, reason || "The last run drew no page."));
 }
 
 function frame(name, part, title) {
   return h("iframe", {
     src: `/page?${new URLSearchParams({ name, part })}`,
     title,
-    sandbox: "allow-scripts allow-popups",
+    sandbox: "allow-scripts allow-popups allow-downloads",
   });
 }
 
-export async function showGait(all) {
-  if (await resultsOf(all)) put(all.panel, frame(all.name, "gait", "What moved: curves and values of the last run"));
-}
+export const showGait = (all) => showPage(all, "gait", "What moved: curves and values of the last run");
 
-export async function showBody(all) {
-  if (await resultsOf(all))
-    put(all.panel, frame(all.name, "body", "The body of the last run, its replay and masses"));
-}
+export const showBody = (all) => showPage(all, "body", "The body of the last run, its replay and masses");
 
 function place({ about, trial }) {
   // where a sentence belongs: what is looked at, and the recording

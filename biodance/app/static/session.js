@@ -57,6 +57,7 @@ export async function showSession(main, page, name, tab) {
   };
   const edit = (...changes) => changed("edit", { changes });
   const run = async () => {
+    say(""); // of the run before
     try {
       await page.queue; // what was changed just now is a part of it
       page.run = (await tell("run", { names: [name] })).run;

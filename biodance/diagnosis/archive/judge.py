@@ -169,7 +169,7 @@ class ArchiveJudgement:
     conditions : tuple of ConditionEffect
         What kinds of trial read that is not the plate's.
     strangers : tuple of Stranger
-        People and visits unlike the others.
+        People and visits unlike the others by what matters.
     histories : tuple of History
         Of every quantity that was seen.
     """
@@ -198,7 +198,8 @@ def judge_archive(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
     histories = tuple(history(series_of(name, base, visits)) for name in quantities)
     plates = sorted({plate for one in observations for plate in one.plates})
     cards = tuple(_card(plate, base, histories, conditions) for plate in plates)
-    strangers = tuple(one for some in histories for one in some.strangers)
+    every = (one for some in histories for one in some.strangers)
+    strangers = tuple(one for one in every if abs(one.value) >= PLATE_QUANTITIES[one.quantity].matters)
     return ArchiveJudgement(visits, cards, conditions, strangers, histories)
 
 

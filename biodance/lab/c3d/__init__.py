@@ -87,9 +87,11 @@ def read_header(content: bytes, where: str) -> Header:
     if not content:
         raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
     if len(content) < 2 * C3D_BLOCK or content[1] != 0x50:
+        short = len(content) < 2 * C3D_BLOCK
+        seen = f"has {len(content)} bytes, and not 1024 at least" if short else "does not begin as one"
         raise FileRefused(
-            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 "
-            "bytes, expected). Check that the file is a C3D export and not another format with that name."
+            f"{where}: this is not a C3D file: it {seen}. Check that it is a C3D export and not another format with "
+            f"that name."
         )
     # Blocks are counted from 1.
     start = (content[0] - 1) * C3D_BLOCK

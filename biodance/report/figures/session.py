@@ -288,17 +288,17 @@ def repetitions_figure(
     found: Repetitions, quantities: Sequence[str], about: str, normal: Sequence[NormalCurve] = ()
 ) -> str:
     """Return a panel a quantity: repetitions, mean, sd of sides, before ``normal`` bands; "" for none."""
-    groups = [one for one in found.groups if np.isfinite(one.mean).any()]
+    groups, beside = [one for one in _by_side(found.groups) if np.isfinite(one.mean).any()], _by_side(found.beside)
     # where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side
     offs = [(found.off(side), _LOOKS[side]) for side in (SIDES if found.kind == "gait" else ("middle",))]
     rules = [(off.mean, svg.Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
     cells = []
     for quantity in quantities:
-        same = sorted((one for one in groups if one.quantity == quantity), key=lambda one: list(_LOOKS).index(one.side))
+        same = [one for one in groups if one.quantity == quantity]
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
             usual = [svg.Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
-            files = [one for one in found.beside if one.quantity == quantity]
+            files = (one for one in beside if one.quantity == quantity)
             theirs = [svg.Curve(f"{one.side}, plug-in gait", one.mean, _DOTTED[one.side]) for one in files]
             least = LEAST_SPANS.get(same[0].unit, 0.0)
             curves = [*usual, *_curves(same), *theirs]
@@ -308,6 +308,11 @@ def repetitions_figure(
     people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
     band = f"one sd between cycles{people}"
     return svg.CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
+
+
+def _by_side(groups: Sequence[CurveGroup]) -> list[CurveGroup]:
+    """Return groups in the order of the sides in every legend, whichever foot came first."""
+    return sorted(groups, key=lambda one: list(_LOOKS).index(one.side))
 
 
 def curve_title(group: CurveGroup) -> str:

@@ -35,7 +35,7 @@ def left_figure(left: tuple[Residuals, Residuals]) -> str:
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     time = np.arange(len(before)) / rate
-    drawn = (("as it is", before, svg.LEFT_SIDE), ("findings accepted", after, svg.RIGHT_SIDE))
+    drawn = (("as it is", before, svg.TABLE), ("findings accepted", after, svg.IDENTIFIED))
     cells = []
     for k in (0, 3, 1, 4, 2, 5):
         curves = [svg.Curve(name, np.where(use, value[:, k], np.nan), look) for name, value, look in drawn]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED, Interval, spaced
+from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, Interval, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, known_interval
 from biodance.identification.sessions import Difference, certain_changes
@@ -103,7 +103,7 @@ _PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along t
 
 
 def changes_figure(changes: tuple[Difference, ...], certain: tuple[Difference, ...]) -> str:
-    """Return what changed in every segment, later less earlier, with intervals: orange ``certain``, open unknown."""
+    """Return what changed in every segment, later less earlier, with intervals: green ``certain``, open unknown."""
     names = list(dict.fromkeys(row.segment for row in changes))
     ticks = tuple((len(names) - 1.0 - i, spaced(name)) for i, name in enumerate(names))
     y, drawn = svg.Axis(-0.6, len(names) - 0.4, "", ticks), []
@@ -113,7 +113,7 @@ def changes_figure(changes: tuple[Difference, ...], certain: tuple[Difference, .
         x = svg.around(np.append(ends, 0.0), label=title)
         marks = [svg.rule(x, 0.0, upright=True, look=svg.Stroke(BLACK, "", 0.8))]
         for (at, _), row in zip(ticks, rows, strict=True):
-            look = svg.Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
+            look = svg.Stroke(GREEN if row in certain else BLACK if row.known else GREY, "", 1.6)
             marks.append(svg.segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
             inside = "" if row.known else "#fff"
             marks.append(svg.points(x, y, factor * row.value, at, look, inside=inside))

@@ -74,7 +74,7 @@ def key_figures(result: SessionResult) -> list[Tile]:
     one = result.identification
     if one and one.identification.status == "solved":
         masses = [known.verdict for known in one.identification.known if known.quantity == "mass"]
-        gain = f"{format_number(one.gain.force, 2)} times closer on kept trials" if one.gain else "gain not proven"
+        gain = f"kept trials fit {format_number(one.gain.force, 2)} times closer" if one.gain else "no gain is proven"
         value = f"{masses.count('known')} known, {masses.count('partly known')} partly"
         tiles.append(Tile(f"Masses of {len(masses)} segments", value, gain))
     return tiles

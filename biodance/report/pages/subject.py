@@ -201,14 +201,14 @@ _WHY = {
     movement.WHY_STOPPED: N_("The work was stopped before its end."),
     movement.WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
     movement.WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
-    movement.WHY_DOUBTED: N_("The small balls on your skin did not tell us well where your joints are."),
+    movement.WHY_DOUBTED: N_("The small balls on your skin did not show clearly where your joints are."),
     movement.WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
-    "mass on the plates": N_("The weight on our plates was not the weight we wrote down."),
+    "mass on the plates": N_("The weight on our plates differed from the weight that we wrote down."),
     "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
-    "marker distance": N_("The small balls on your skin were not where our model of you had them."),
-    "markers not seen": N_("The cameras lost some of the small balls on your skin for too long."),
+    "marker distance": N_("The small balls on your skin did not fit our model of your body."),
+    "markers not seen": N_("The cameras lost sight of some of the small balls on your skin for too long."),
     "fully measured": N_("You had both feet on our plates for too short a time."),
-    "force difference": N_("The push on the plates was not what your moves should give."),
+    "force difference": N_("The force on the plates did not fit the way you moved."),
 }
 """Reason for withholding, by its beginning -> a sentence for the subject."""
 _ELSE = N_("One of our checks failed.")

@@ -124,6 +124,40 @@
     }
   }
 
+  function drawing(root) { // the figure as it is seen, in one SVG with its own style
+    const frame = root.getBoundingClientRect(), size = { width: frame.width, height: frame.height };
+    const look = { "font-family": "sans-serif", "font-size": "10.5px" };
+    const whole = element("svg", { viewBox: `0 0 ${size.width} ${size.height}`, ...size, ...look });
+    const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
+    const own = rules.filter((rule) => /^\.(plot|panel text|panel \.title|swatch path)/.test(rule.selectorText || ""));
+    whole.append(element("style", {}, own.map((rule) => rule.cssText).join(" ")));
+    for (const one of root.querySelectorAll(".panel, .legend svg")) {
+      const box = one.getBoundingClientRect(), made = one.cloneNode(true);
+      const place = { x: box.left - frame.left, y: box.top - frame.top, width: box.width, height: box.height };
+      for (const [key, value] of Object.entries(place)) made.setAttribute(key, value);
+      whole.append(made);
+      const word = one.parentElement.dataset.name;
+      if (word) whole.append(element("text", { x: place.x + place.width + 5, y: place.y + place.height }, word));
+    }
+    whole.querySelectorAll(".cursor, .drag").forEach((one) => one.remove());
+    return new XMLSerializer().serializeToString(whole);
+  }
+
+  function table(panels) { // the curves that are shown, as CSV
+    const value = ([a, b], step) => (a + ((b - a) * step) / STEPS).toPrecision(6);
+    const row = (panel, line) => ([x, y]) =>
+      `"${panel.svg.dataset.title}","${line.dataset.name}",${value(panel.x, x)},${value(panel.y, y)}`;
+    const lines = panels.flatMap((panel) => panel.lines.filter((line) => !line.classList.contains("off"))
+      .flatMap((line) => panel.data(line).map(row(panel, line))));
+    return ["panel,curve,along,value", ...lines, ""].join("\n");
+  }
+
+  function save(text, type, name) {
+    const link = document.createElement("a");
+    [link.href, link.download] = [URL.createObjectURL(new Blob([text], { type })), name.replace(/[^\w.]+/g, "_")];
+    link.click();
+  }
+
   function figure(root, k) {
     const panels = [...root.querySelectorAll(".panel")].map((svg) => new Panel(svg));
     const cells = [...root.querySelectorAll(".cell")].map((cell) => panels.filter((p) => cell.contains(p.svg)));
@@ -153,6 +187,9 @@
     button("+", "zoom in", () => narrow(0.5));
     button("\u2212", "zoom out", () => narrow(2));
     button("all", "show all", () => show([0, STEPS]));
+    const called = `${document.title} ${root.getAttribute("aria-label")}`;
+    button("SVG", "save the figure as SVG", () => save(drawing(root), "image/svg+xml", `${called}.svg`));
+    button("CSV", "save its values as CSV", () => save(table(panels), "text/csv", `${called}.csv`));
     root.querySelector(".legend").append(zoom);
 
     const point = (step, cell, told) => {

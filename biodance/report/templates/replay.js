@@ -52,7 +52,7 @@
       head.position.y = length - 3 * radius;
     };
   }
-  const measured = arrow(0x000000, 0.011), simulated = arrow(0xd55e00, 0.009), left = arrow(0xcc79a7, 0.013);
+  const measured = arrow(0x000000, 0.011), simulated = arrow(0x009e73, 0.009), left = arrow(0xcc79a7, 0.013);
   const floor = add(new THREE.GridHelper(6, 12, 0xcccccc, 0xe4e4e4));
   floor.rotation.x = Math.PI / 2;
   let markers = null, plates = null;
