@@ -84,7 +84,6 @@ ONE_ALGORITHM = {
     "lab/inspect.py": "what a recording and a session hold, for a person and as the first session.toml",
     "motion/ik/compiled/legs.py": "the legs of a person in closed form, and any of six joints by Newton",
     "body/tables/anthropometry.py": "tables with provenance, and among them those of segments, row by row",
-    "registration/refinement.py": "a pose pulled by wrench and steps: rows, covariance, change, again from there",
     "report/figures/vector.py": "a light figure: axis, steps, marks, panel, curves; every mark is read by one script",
     "virtual_lab/recording_faults.py": "faults of a recording: three builders and what each of them makes",
     "virtual_lab/movement/gait.py": "one stride on a belt: feet, forces, and the motion that they make, by repetition",

@@ -18,16 +18,9 @@ from biodance.lab.prepare import force_filter, low_pass
 from biodance.records import Array, Markers, Mask, Motion, Plate, Trial, Wrench, freeze
 from biodance.records.motion import BY_FRAME
 from biodance.settings import COP_FORCE, Settings
-from biodance.spatial import axis_rotation, wrench_about_origin, zero_moment_point
+from biodance.spatial import axis_rotation, turned_wrench, wrench_about_origin, zero_moment_point
 
 _UP = np.array([0.0, 0.0, 1.0])
-_RATE = 200.0
-"""Hz at which low-passed forces are kept between two looks: ten times the default cut-off."""
-
-_LOADED = 50.0
-"""N: somebody stood on a plate that carried more."""
-_UNSIZED = "MOT"
-"""Format of recordings that does not say where a plate ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +56,7 @@ class FramePose:
     def wrench(self, value: Array) -> Array:
         """Return wrenches (..., 6) about the file's origin as wrenches about the room's."""
         # Both vectors turn about the file's origin; then the moment is taken to the room's.
-        turned = np.concatenate([value[..., :3] @ self.turn.T, value[..., 3:] @ self.turn.T], axis=-1)
-        return wrench_about_origin(turned, self.shift)
+        return wrench_about_origin(turned_wrench(value, self.turn), self.shift)
 
     def in_room(self, plate: Plate, time: Array, value: Array) -> Plate:
         """Return a plate of the file in the room, with what it recorded, ``value`` (T, 6) about the file's origin."""
@@ -95,8 +87,8 @@ class Forces:
 
     @property
     def loaded(self) -> Mask:
-        """(P,) whether somebody ever stands on a plate."""
-        return np.asarray(self.value[:, :, 2].max(axis=1) > _LOADED)
+        """(P,) whether somebody ever stands on a plate: it carries more than 50 N."""
+        return np.asarray(self.value[:, :, 2].max(axis=1) > 50.0)
 
     @property
     def height(self) -> float:
@@ -130,10 +122,11 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     raw = np.stack([plate.wrench.value for plate in trial.plates])
     if not np.isfinite(raw).all():
         raise TrialRefused(f"{trial.source.path}: some force samples are not numbers. Export the file again.")
-    rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // _RATE))
+    # Kept at 200 Hz, ten times the default cut-off.
+    rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // 200.0))
     value = np.stack([low_pass(one, rate, force_filter(settings)) for one in raw])[:, ::step]
     spline = make_interp_spline(time[::step], value, k=3, axis=1)
-    return Forces(trial.plates, time[::step], value, spline, trial.source.format != _UNSIZED)
+    return Forces(trial.plates, time[::step], value, spline, trial.source.format != "MOT")
 
 
 def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
@@ -171,8 +164,6 @@ _STEP, _EVERY = 0.02, 0.04
 """s between two delays, and between two samples."""
 _LEAST = 0.4
 """s of loaded plates, and of shared time."""
-_APART = 0.1
-"""s between the delays of two hypotheses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +233,7 @@ def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -
     # Four times finer around the highest peak; the others are looked at as they are.
     fine = peaks[0].pose.delay + np.arange(-_STEP, 1.05 * _STEP, _STEP / 4)
     best = max(_scanned(motion, needed, forces, height, fine), key=lambda one: one.gain)
-    return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > _APART))
+    return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > 0.1))
 
 
 def _scanned(
