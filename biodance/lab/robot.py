@@ -20,10 +20,6 @@ from biodance.spatial import wrench_about_point
 _ENCODER_TABLES = (".csv", ".parquet")
 _TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
-_LONGEST_GAP = 0.1
-"""s without a sample over which angles are not interpolated: a joint moves visibly in it."""
-_TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
-_BEYOND = 0.35  # rad beyond a joint's range that an encoder may show: stops give, zeros are set by hand
 
 
 def read_encoders(path: Path, *, unit: str = "") -> Encoders:
@@ -79,7 +75,7 @@ def _check_clock(path: Path, time: Array) -> None:
     if not (steps > 0).all():
         row = int(np.argmax(steps <= 0))
         raise FileRefused(f"{path}: time does not increase in row {row + 3} ({time[row]:g} s, then {time[row + 1]:g}).")
-    if steps.max() > _LONGEST_GAP:
+    if steps.max() > 0.1:  # a joint moves visibly in it: angles are not interpolated
         row = int(steps.argmax())
         raise FileRefused(
             f"{path}: nothing was recorded for {steps.max():.3g} s after {time[row]:.3f} s. Give pieces without a gap "
@@ -116,13 +112,13 @@ def for_joints(
     # Positive: how far beyond the nearer limit.
     beyond = np.maximum(low - angle.min(axis=0), angle.max(axis=0) - high)
     worst = int(np.argmax(beyond))
-    if np.abs(angle).max() > _TURN:
+    if np.abs(angle).max() > 2 * np.pi:
         most = int(np.argmax(np.abs(angle).max(axis=0)))
         raise FileRefused(
             f"{where}: {joints[most]} reaches {np.abs(angle[:, most]).max():.1f} rad, which no joint can. In degrees? "
             f"Then say so in the heading, '{joints[most]} (deg)', or in recording.toml: angle_unit = \"deg\"."
         )
-    if beyond[worst] > _BEYOND:
+    if beyond[worst] > 0.35:  # stops give, zeros are set by hand
         raise FileRefused(
             f"{where}: {joints[worst]} goes from {angle[:, worst].min():.2f} to {angle[:, worst].max():.2f} rad, the "
             f"URDF lets it go from {low[worst]:.2f} to {high[worst]:.2f}. Are columns swapped, signs turned, or in "

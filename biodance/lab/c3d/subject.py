@@ -118,10 +118,6 @@ def muscle_of(label: str) -> tuple[str, str] | None:
     return None
 
 
-_SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
-_WORDS = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
-
-
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
     """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time from the first frame; what the muscles did
@@ -169,8 +165,10 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FootEvent, ...]:
     first = (layout.first_frame - 1) / layout.rate
     found = []
     words = zip(times.T, texts(parameters, "EVENT", "CONTEXTS"), texts(parameters, "EVENT", "LABELS"), strict=False)
+    sides = {"left": "left", "right": "right", "l": "left", "r": "right"}
+    kinds = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
     for (minutes, seconds), context, label in words:
-        side, down = _SIDES.get(context.strip().lower()), _WORDS.get(label.strip().lower())
+        side, down = sides.get(context.strip().lower()), kinds.get(label.strip().lower())
         if side is not None and down is not None:
             found.append(FootEvent(float(60 * minutes + seconds - first), side, down, "file"))
     return tuple(sorted(found, key=lambda one: one.time))
@@ -184,12 +182,6 @@ class MarkerLabels:
     names: tuple[str, ...]
     history: tuple[str, ...]
     warnings: tuple[str, ...]
-
-
-_OBJECT = 6
-"""Markers of a thing at most (a club, a wheel, a probe): three on each of two rigid parts. Fewer than seven markers
-show no pelvis with two legs.
-"""
 
 
 def subjects_in(path: Path) -> tuple[str, ...]:
@@ -208,7 +200,9 @@ def subjects_of(labels: Sequence[str], parameters: Parameters) -> tuple[str, ...
 def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
     """Return those of the prefixes, one for each marker, that name people; all where nobody carries many."""
     counts = Counter(prefixes)
-    enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
+    # A thing (a club, a wheel, a probe) has six markers at most, three on each of two rigid parts; fewer than seven
+    # show no pelvis with two legs.
+    enough = {prefix for prefix, count in counts.items() if count > 6}
     return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))
 
 
