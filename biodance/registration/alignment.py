@@ -177,34 +177,26 @@ class Alignment:
     misfit: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """Complex numbers over the loaded samples: measured ``cop`` m, ``shear`` N; needed the same; ``lift`` the
-    squared misfit of the vertical force.
+def _aligned(
+    cop: Array, shear: Array, needed_cop: Array, needed_shear: Array, lift: Array
+) -> tuple[complex, complex, Array]:
+    """Return turn and shift (complex) and the loss (n,) of every loaded sample: complex numbers of the measured ``cop``
+    m and ``shear`` N, and of the needed ones; ``lift`` the squared misfit of the vertical force.
     """
-
-    cop: Array
-    shear: Array
-    needed_cop: Array
-    needed_shear: Array
-    lift: Array
-
-    def aligned(self) -> tuple[complex, complex, Array]:
-        """Return turn and shift (complex) and the loss (n,) of every sample."""
-        # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
-        weight = 1.0 / (1.0 + self.lift / _OUTLIER) ** 2
-        for _ in range(4):
-            centre, needed = (np.sum(weight * x) / weight.sum() for x in (self.cop, self.needed_cop))
-            # the argument of sum conj(a) b is the turn that carries a onto b
-            both = np.sum(weight * np.conj(self.cop - centre) * (self.needed_cop - needed)) / _PRESSURE**2
-            # Shear is a vector without a place: nothing is centred.
-            both += np.sum(weight * np.conj(self.shear) * self.needed_shear) / _SHEAR**2
-            turn = complex(np.exp(1j * np.angle(both)))
-            apart = np.abs(self.needed_cop - needed - turn * (self.cop - centre)) ** 2 / _PRESSURE**2
-            loss = apart + np.abs(self.needed_shear - turn * self.shear) ** 2 / _SHEAR**2 + self.lift
-            weight = 1.0 / (1.0 + loss / _OUTLIER) ** 2
-        # p = turn (c - c0) + p0, so the shift is p0 - turn c0.
-        return turn, complex(needed - turn * centre), loss / (1.0 + loss / _OUTLIER)
+    # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
+    weight = 1.0 / (1.0 + lift / _OUTLIER) ** 2
+    for _ in range(4):
+        centre, needed = (np.sum(weight * x) / weight.sum() for x in (cop, needed_cop))
+        # the argument of sum conj(a) b is the turn that carries a onto b
+        both = np.sum(weight * np.conj(cop - centre) * (needed_cop - needed)) / _PRESSURE**2
+        # Shear is a vector without a place: nothing is centred.
+        both += np.sum(weight * np.conj(shear) * needed_shear) / _SHEAR**2
+        turn = complex(np.exp(1j * np.angle(both)))
+        apart = np.abs(needed_cop - needed - turn * (cop - centre)) ** 2 / _PRESSURE**2
+        loss = apart + np.abs(needed_shear - turn * shear) ** 2 / _SHEAR**2 + lift
+        weight = 1.0 / (1.0 + loss / _OUTLIER) ** 2
+    # p = turn (c - c0) + p0, so the shift is p0 - turn c0.
+    return turn, complex(needed - turn * centre), loss / (1.0 + loss / _OUTLIER)
 
 
 def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -> tuple[Alignment, ...]:
@@ -247,14 +239,18 @@ def _scanned(
     for delay in map(float, delays):
         samples = _samples(motion, needed, forces, delay, height)
         if samples is not None:
-            turn, shift, loss = samples.aligned()
+            turn, shift, loss = _aligned(*samples)
             pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
             # The loss of a sample stays below `_OUTLIER`: each one that fits adds, none takes off.
             yield Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
 
 
-def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height: float) -> _Samples | None:
-    """Return the samples in which the plates are loaded under one delay; None where they are too few."""
+def _samples(
+    motion: Motion, needed: Array, forces: Forces, delay: float, height: float
+) -> tuple[Array, Array, Array, Array, Array] | None:
+    """Return the samples in which the plates are loaded under one delay, as `_aligned` takes them; None where they are
+    too few.
+    """
     every = max(1, round(_EVERY * motion.rate))
     time, value = motion.time[::every], needed[::every]
     measured = forces.during(time + delay).sum(axis=0)
@@ -266,4 +262,4 @@ def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height
         return None
     # A plane as complex numbers: x + iy.
     a, b, c, d = (x[use, 0] + 1j * x[use, 1] for x in (here, measured, there, value))
-    return _Samples(a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2)
+    return a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2

@@ -3,7 +3,7 @@ the feet of ordinary steps, by where the pressure lies in them and when the heel
 their covariance: two steps of one foot do not halve it.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,14 +46,6 @@ class PoseEvidence:
         change = covariance @ self.vector
         wider = np.linalg.inv(covariance + added)  # the change itself stays as it is
         return PoseEvidence(np.asarray(wider), wider @ change, self.misfit, self.rows)
-
-
-def together(pulls: Iterable[PoseEvidence]) -> tuple[Array, Array]:
-    """Return the change (4,) of the pose that all evidence asks for, and its covariance (4, 4)."""
-    some = tuple(pulls)
-    # independent evidence of one change: informations and vectors add up
-    covariance = np.linalg.inv(np.sum([one.information for one in some], axis=0))
-    return covariance @ np.sum([one.vector for one in some], axis=0), covariance
 
 
 _SOUGHT = (f"{POSITION.name} x", f"{POSITION.name} y", f"{ROTATION.name} z", DELAY.name)
@@ -132,8 +124,6 @@ def feet_pull(trial: Trial, about: Array) -> tuple[PoseEvidence | None, int]:
     return PoseEvidence(information, vector, misfit, len(found)), len({one.contact for one in found})
 
 
-_ALIGNED = np.array([0.05, 0.05, np.radians(3.0), 0.03])
-"""m, m, rad, s: how far an alignment is off (16 real walks, 23 simulated trials: up to 22 mm, 3 degrees, 20 ms)."""
 _REAL = np.array([0.012, 0.012, np.radians(0.5), 0.008])
 """m, m, rad, s beyond its own for the wrench of real people and of contacts shorter than a second: the table's centre
 of mass lies up to 40 mm from theirs, and flesh lags (ten walks: 13 mm and 8 ms root mean square, always late)."""
@@ -219,8 +209,9 @@ def refined(
         Neither the wrench nor the feet tell anything: no fully measured contact, no step.
     """
     pose, why = start, ""
-    # A prior of the change, centred at the present pose in every round: it damps, and holds what nobody sees.
-    weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
+    # A prior of the change, centred at the present pose in every round: it damps, and holds what nobody sees. An
+    # alignment is off by up to 22 mm, 3 degrees and 20 ms (16 real walks, 23 simulated trials).
+    weak = np.diag(np.array([0.05, 0.05, np.radians(3.0), 0.03]) ** -2.0)
     for turn in range(3):
         window, about = _look(body, trial, motion, forces, pose)
         placed = replace(window.trial, plates=registered_plates(forces.plates, pose))
@@ -234,7 +225,9 @@ def refined(
             raise TrialRefused(
                 f"Neither the body's wrench nor a step tells where the plates lie; are these files of one trial? {why}"
             )
-        change, covariance = together([*pulls, weak])
+        # Independent evidence of one change: informations and vectors add up.
+        covariance = np.linalg.inv(np.sum([weak, *(one.information for one in pulls)], axis=0))
+        change = covariance @ np.sum([one.vector for one in pulls], axis=0)
         pose = pose.changed(change, about)
         # Never after the first round: the linearisation was at the alignment.
         if turn and (np.abs(change) < 0.1 * np.sqrt(np.diag(covariance))).all():
