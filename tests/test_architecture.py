@@ -100,7 +100,6 @@ ONE_ALGORITHM = {
     "lab/markers/signals.py": "markers that do what no body does, and the gaps that they leave",
     "lab/markers/upright.py": "who stands in a cloud of points: quiet frames, axis to the head, person",
     "lab/readers/trc.py": "a .trc file, read and written, with the forces beside it",
-    "lab/robot.py": "a robot's folder: encoder tables, plates, and which belong together",
     "lab/session/file.py": "session.toml, key by key",
     "lab/session/results_folder.py": "a folder of results that is there whole or not at all, with its manifest",
     "motion/contact.py": "which frames are fully measured, and why the others are not",

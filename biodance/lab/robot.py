@@ -17,8 +17,6 @@ from biodance.records import ROLES, Array, Markers, Role, Wrench
 from biodance.records.motion import Encoders
 from biodance.spatial import wrench_about_point
 
-_ENCODER_TABLES = (".csv", ".parquet")
-_TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
 
 
@@ -34,7 +32,7 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     """
     cells = read_cells(read_bytes(path), path, least=2)
     values, names = cells.values, cells.labels
-    clock = next((i for i, name in enumerate(names) if name.lower() in _TIMES), None)
+    clock = next((i for i, name in enumerate(names) if name.lower() in ("time", "t", "time_s", "timestamp")), None)
     if clock is None:
         raise FileRefused(
             f"{path}: no column is the time; the columns are {', '.join(names[:6])} ... Name one 'time', in s."
@@ -131,7 +129,7 @@ def for_joints(
 
 
 _FILE = "recording.toml"
-_ENDS = re.compile(r"[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", re.IGNORECASE)
+
 _KEPT = re.compile(r"valid|unseen|kept|squat", re.IGNORECASE)
 _KEYS = {"angle_unit": str, "joints": dict, "trials": dict, "base": dict}
 
@@ -246,7 +244,7 @@ def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path,
     tables, plates = list[Path](), list[Path]()
     for path in files:
         with suppress(BiodanceError):
-            is_table = path.suffix.lower() in _ENCODER_TABLES
+            is_table = path.suffix.lower() in (".csv", ".parquet")
             if is_table and joints & set(read_cells(read_bytes(path), path, least=2).labels):
                 tables.append(path)
                 continue
@@ -278,7 +276,7 @@ def _plate_of(table: Path, plates: list[Path]) -> Path:
 
 
 def _stem(path: Path) -> str:
-    return _ENDS.sub("", path.stem) or path.stem
+    return re.sub(r"(?i)[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", "", path.stem) or path.stem
 
 
 def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: dict[str, str]) -> RobotTrial:

@@ -48,10 +48,6 @@ class PoseEvidence:
         return PoseEvidence(np.asarray(wider), wider @ change, self.misfit, self.rows)
 
 
-_SOUGHT = (f"{POSITION.name} x", f"{POSITION.name} y", f"{ROTATION.name} z", DELAY.name)
-"""Tolerances of an installed plate that are no tolerances here: they are what is looked for."""
-
-
 def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: Array) -> PoseEvidence:
     """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about``
     (3,) m.
@@ -61,7 +57,9 @@ def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: 
     TrialRefused
         No quarter of a second is fully measured and believable.
     """
-    known = replace(tolerances, sizes={key: size for key, size in tolerances.sizes.items() if key not in _SOUGHT})
+    # Tolerances of an installed plate that are no tolerances here: they are what is looked for.
+    sought = (f"{POSITION.name} x", f"{POSITION.name} y", f"{ROTATION.name} z", DELAY.name)
+    known = replace(tolerances, sizes={key: size for key, size in tolerances.sizes.items() if key not in sought})
     # Of walks over two plates no more than 0.3 to 0.9 s are fully measured.
     put = problem(body, (window,), shortest=0.25)
     found = model(put, candidates(put), known)
@@ -124,9 +122,6 @@ def feet_pull(trial: Trial, about: Array) -> tuple[PoseEvidence | None, int]:
     return PoseEvidence(information, vector, misfit, len(found)), len({one.contact for one in found})
 
 
-_REAL = np.array([0.012, 0.012, np.radians(0.5), 0.008])
-"""m, m, rad, s beyond its own for the wrench of real people and of contacts shorter than a second: the table's centre
-of mass lies up to 40 mm from theirs, and flesh lags (ten walks: 13 mm and 8 ms root mean square, always late)."""
 _PRESSED = 100.0  # N of a foot that stands on a plate
 ENOUGH_ROWS = 300
 """Rows of the wrench (some two seconds) from which on it alone can judge."""
@@ -280,7 +275,10 @@ def _honest(pull: PoseEvidence, window: TrialWindow) -> PoseEvidence:
     if real or longest < SHORTEST_RUN:
         # Below 60 rows (some 0.5 s of contact) the yaw errs by more, in proportion.
         few = np.array([1.0, 1.0, max(1.0, 60 / pull.rows), 1.0])
-        return scaled.less_sure(worse * np.diag((few * _REAL) ** 2))
+        # m, m, rad, s: the table's centre of mass lies up to 40 mm from a real person's, and flesh lags (ten walks: 13
+        # mm and 8 ms root mean square, always late).
+        beyond = np.array([0.012, 0.012, np.radians(0.5), 0.008])
+        return scaled.less_sure(worse * np.diag((few * beyond) ** 2))
     # Mean horizontal direction of the pelvis' x axis.
     ahead = quaternion_matrix(window.motion.q[:, 3:7])[:, :2, 0].mean(axis=0)
     forwards = np.array([*ahead / max(float(np.linalg.norm(ahead)), 1e-9), 0.0, 0.0])

@@ -31,10 +31,6 @@ Laird 1986, doi:10.1016/0197-2456(86)90046-2): knees on 22, iliac spines 25, acr
 """
 _ALIKE = 0.4
 """Correlation of the shares of two landmarks, the mean over the pairs: long legs lift all of them."""
-_RISE = 0.026
-"""Share of the stature by which acromion markers rise with arms lifted by 90 degrees (45 mm at 1.75 m), in proportion
-to the angle and known to half; measured on 7 people with arms out and 6 with arms down.
-"""
 
 
 def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
@@ -47,12 +43,13 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     """
     at = _places(trial)
     ankles = _mean(at, tuple(f"{side}_ankle_lateral" for side in SIDES))
-    # the share of the stature by which lifted arms raise the acromion markers, known to half
+    # The share of the stature by which lifted arms raise the acromion markers, known to half: 2.6 % by arms lifted by
+    # 90 degrees (45 mm at 1.75 m), in proportion to the angle (7 people with arms out, 6 with arms down).
     ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
     arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
     # Arms without a marker at the elbow are taken to be lifted by 45 degrees.
-    rise = _RISE * (float(np.mean(angles)) if angles else 45.0) / 90.0
+    rise = 0.026 * (float(np.mean(angles)) if angles else 45.0) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
         height = _mean(at, landmarks)[2] - ankles[2]
