@@ -107,7 +107,7 @@ def measured(one: Cut, forces: Path) -> dict[str, Any]:
     except biodance.BiodanceError as error:
         return row | {"status": "not done", "reason": str(error)[:200]}
     row |= {"status": found.status, "reason": found.reason[:200]}
-    if found.pose is None:
+    if found.pose is None or len(found.plates) != len(one.plates):  # forces of another laboratory
         return row
     error, sd = [], []
     for plate, true in zip(found.plates, one.plates, strict=True):

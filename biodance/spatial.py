@@ -149,6 +149,11 @@ def wrench_about_origin(wrench: _Array, point: ArrayLike) -> _Array:
     return wrench_about_point(wrench, -np.asarray(point))
 
 
+def turned_wrench(wrench: _Array, turn: _Array) -> _Array:
+    """Return wrenches (..., 6) in the axes to which ``turn`` (3, 3) leads, about the same point."""
+    return np.concatenate([wrench[..., :3] @ turn.T, wrench[..., 3:] @ turn.T], axis=-1)
+
+
 def wrench_of_force(force: _Array, point: ArrayLike) -> _Array:
     """Return the wrenches (..., 6) about the origin of forces (..., 3) N that act at ``point`` (3,) or (..., 3) m."""
     moment = cross(np.asarray(point), force)

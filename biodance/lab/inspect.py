@@ -33,8 +33,6 @@ _KEYS = (
     "file status reason format frames rate_hz analog_rate_hz markers marker_set marker_map gaps_percent subjects "
     "plates mean_vertical_n mass_on_plates_kg declared_mass_kg declared_height_m history warnings"
 )
-_SHORTEST_STEP = 0.05
-"""Seconds under load from which on a plate has a centre of pressure; less is noise."""
 
 
 def inspect_paths(
@@ -166,7 +164,8 @@ def _plate(plate: Plate) -> dict[str, Any]:
     force = np.nanmean(plate.wrench.force, axis=0) if plate.wrench.time.size else np.full(3, math.nan)
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
-    stepped_on = loaded.size > 0 and len(loaded) >= _SHORTEST_STEP * plate.wrench.rate
+    # Less than 0.05 s under load is noise.
+    stepped_on = loaded.size > 0 and len(loaded) >= 0.05 * plate.wrench.rate
     return {
         "name": plate.name,
         "type": plate.type,
@@ -181,9 +180,6 @@ def _plate(plate: Plate) -> dict[str, Any]:
 
 def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-_FILE = "session.toml"
 
 
 def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
@@ -217,7 +213,7 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     Traceback (most recent call last):
     biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
     """
-    target = Path(folder) / _FILE
+    target = Path(folder) / "session.toml"
     if target.exists():
         raise SessionRefused(
             f"{target} is there already, and nothing of yours is overwritten. Correct it, or move it away and run this "

@@ -23,7 +23,6 @@ from biodance.records import Array
 _LARGEST = 2**31  # Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB
 LARGEST_NUMBER = 1e12
 """In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
-_TEXT_LOOKS_BINARY = b"\x00"
 _PRESENT = "{}: exists already and is not overwritten. Choose another name or remove it."
 
 
@@ -150,7 +149,7 @@ def decode(content: bytes, path: Path) -> str:
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = content.decode("utf-16", errors="replace")
-    elif _TEXT_LOOKS_BINARY in content[:4096]:
+    elif b"\x00" in content[:4096]:
         raise FileRefused(
             f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit."
         )
@@ -244,7 +243,6 @@ def plain_table(lines: Sequence[str], width: int) -> Array | None:
 
 _QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
-_PARQUET = b"PAR1"
 _UNIT = re.compile(r"^(.*?)[\s_]*[(\[{]\s*([^)\]}]*?)\s*[)\]}]$")
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
 
@@ -261,7 +259,7 @@ class Cells:
 
 def is_parquet(content: bytes) -> bool:
     """Return whether bytes begin as those of a Parquet file."""
-    return content.startswith(_PARQUET)
+    return content.startswith(b"PAR1")
 
 
 def read_cells(content: bytes, path: Path, *, least: int = 4) -> Cells:

@@ -20,7 +20,6 @@ from biodance.settings import FORCE_DOWN, SHORTEST_CONTACT, FilterKind, FilterSe
 
 USUAL_CUTOFF = 10.0
 """Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
-_NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,8 @@ class LowPass:
 
     def __str__(self) -> str:
         down = f"3 dB down at {self.cutoff:g} Hz in both passes together"
-        return f"{_NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
+        name = "Butterworth" if self.kind == "butterworth" else "critically damped"
+        return f"{name} low-pass of order {self.order}, forwards and backwards, {down}"
 
     def gain(self, frequency: Array, rate: float) -> Array:
         """Return the gain (n,) of both passes together at each ``frequency`` (n,) Hz below half the ``rate`` Hz."""

@@ -136,14 +136,10 @@ def _parts(
         found = repr(labels[0]) if labels else "missing"
         raise FileRefused(f"{path}: the first column is {found}, it must be 'time'. Export it again.")
     vectors = _vectors(labels, body[1][1], path) if len(body) > 1 else ()
-    history = [*[COMMAS_READ] * commas, *[_VECTORS_READ] * bool(vectors)]
+    history = [COMMAS_READ] * commas
+    if vectors:
+        history.append("Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z.")
     return header, _columns(labels, vectors), body[1:], vectors, tuple(history)
-
-
-_VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."
-_BRACKETS = str.maketrans("", "", "~()[] ")  # What some writers put around the numbers of one cell
-_OF_PLATE = {"f": "v", "p": "p", "m": "m"}
-"""Force, point and moment of plate N are fN, pN, mN in the tables that OpenSim makes of C3D files."""
 
 
 def _vectors(labels: list[str], row: str, path: Path) -> tuple[str, ...]:
@@ -163,16 +159,17 @@ def _columns(labels: list[str], vectors: tuple[str, ...]) -> tuple[str, ...]:
     """Return the labels of single numbers."""
     found: list[str] = []
     for label in labels:
+        # Force, point and moment of plate N are fN, pN, mN in the tables that OpenSim makes of C3D files.
         plate = re.fullmatch(r"([fpm])(\d+)", label)
-        stem = f"ground_force_{plate[2]}_{_OF_PLATE[plate[1]]}" if plate else f"{label}_"
+        stem = f"ground_force_{plate[2]}_{plate[1].replace('f', 'v')}" if plate else f"{label}_"
         found += [f"{stem}{axis}" for axis in "xyz"] if label in vectors else [label]
     return tuple(found)
 
 
 def _numbers(row: str, width: int, where: str) -> list[float]:
     found = cells(row)
-    if any("," in cell for cell in found):
-        found = [part for cell in found for part in cell.translate(_BRACKETS).split(",")]
+    if any("," in cell for cell in found):  # several numbers, with what some writers put around them
+        found = [part for cell in found for part in re.sub(r"[~()\[\] ]", "", cell).split(",")]
     found = found[:-1] if len(found) == width + 1 and not found[-1] else found
     if len(found) != width:
         raise FileRefused(f"{where}: holds {len(found)} cells, {width} are expected. Export the file again.")
@@ -180,7 +177,6 @@ def _numbers(row: str, width: int, where: str) -> list[float]:
 
 
 _VERSION = "40000"
-_AXES = "xyz"
 
 
 def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
@@ -197,7 +193,7 @@ def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
         middle = cop[known].mean(axis=0) if known.any() else np.zeros(3)
         point = np.broadcast_to(middle, (wrench.time.size, 3))
         torque = wrench_about_point(wrench.value, point)[:, 3:]
-        columns += [f"{segment}_{part}{axis}" for part in ("force_v", "force_p", "torque_") for axis in _AXES]
+        columns += [f"{segment}_{part}{axis}" for part in ("force_v", "force_p", "torque_") for axis in "xyz"]
         # Rows times R are R' of each vector: from z up back to y up.
         values += [part @ Y_UP_TO_Z_UP for part in (wrench.force, point, torque)]
     return TimeTable(name, tuple(columns), next(iter(feet.values())).time, np.hstack(values))
@@ -243,7 +239,7 @@ def _text(root: Element) -> str:
 
 VERSION = "1.10.0"
 COMPONENTS = ("x", "y", "z")
-_LABEL = re.compile(r"[^0-9A-Za-z]")
+
 _LAB_FRAME = {
     "lab": {"Description": "x and y horizontal, z up, right-handed", "RotationRule": "right-hand"},
     "joint": {"Description": "axes of the ISB, anatomical signs", "RotationRule": "right-hand"},
@@ -269,7 +265,7 @@ class BidsChannels:
 
 def bids_label(name: str) -> str:
     """Return a name as a BIDS label: letters and digits only."""
-    return _LABEL.sub("", name) or "unnamed"
+    return re.sub(r"[^0-9A-Za-z]", "", name) or "unnamed"
 
 
 def write_description(folder: Path, name: str, *, derived_by: Mapping[str, str] | None = None) -> Path:

@@ -17,13 +17,7 @@ from biodance.records import ROLES, Array, Markers, Role, Wrench
 from biodance.records.motion import Encoders
 from biodance.spatial import wrench_about_point
 
-_ENCODER_TABLES = (".csv", ".parquet")
-_TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
-_LONGEST_GAP = 0.1
-"""s without a sample over which angles are not interpolated: a joint moves visibly in it."""
-_TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
-_BEYOND = 0.35  # rad beyond a joint's range that an encoder may show: stops give, zeros are set by hand
 
 
 def read_encoders(path: Path, *, unit: str = "") -> Encoders:
@@ -38,7 +32,7 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     """
     cells = read_cells(read_bytes(path), path, least=2)
     values, names = cells.values, cells.labels
-    clock = next((i for i, name in enumerate(names) if name.lower() in _TIMES), None)
+    clock = next((i for i, name in enumerate(names) if name.lower() in ("time", "t", "time_s", "timestamp")), None)
     if clock is None:
         raise FileRefused(
             f"{path}: no column is the time; the columns are {', '.join(names[:6])} ... Name one 'time', in s."
@@ -79,7 +73,7 @@ def _check_clock(path: Path, time: Array) -> None:
     if not (steps > 0).all():
         row = int(np.argmax(steps <= 0))
         raise FileRefused(f"{path}: time does not increase in row {row + 3} ({time[row]:g} s, then {time[row + 1]:g}).")
-    if steps.max() > _LONGEST_GAP:
+    if steps.max() > 0.1:  # a joint moves visibly in it: angles are not interpolated
         row = int(steps.argmax())
         raise FileRefused(
             f"{path}: nothing was recorded for {steps.max():.3g} s after {time[row]:.3f} s. Give pieces without a gap "
@@ -116,13 +110,13 @@ def for_joints(
     # Positive: how far beyond the nearer limit.
     beyond = np.maximum(low - angle.min(axis=0), angle.max(axis=0) - high)
     worst = int(np.argmax(beyond))
-    if np.abs(angle).max() > _TURN:
+    if np.abs(angle).max() > 2 * np.pi:
         most = int(np.argmax(np.abs(angle).max(axis=0)))
         raise FileRefused(
             f"{where}: {joints[most]} reaches {np.abs(angle[:, most]).max():.1f} rad, which no joint can. In degrees? "
             f"Then say so in the heading, '{joints[most]} (deg)', or in recording.toml: angle_unit = \"deg\"."
         )
-    if beyond[worst] > _BEYOND:
+    if beyond[worst] > 0.35:  # stops give, zeros are set by hand
         raise FileRefused(
             f"{where}: {joints[worst]} goes from {angle[:, worst].min():.2f} to {angle[:, worst].max():.2f} rad, the "
             f"URDF lets it go from {low[worst]:.2f} to {high[worst]:.2f}. Are columns swapped, signs turned, or in "
@@ -135,7 +129,7 @@ def for_joints(
 
 
 _FILE = "recording.toml"
-_ENDS = re.compile(r"[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", re.IGNORECASE)
+
 _KEPT = re.compile(r"valid|unseen|kept|squat", re.IGNORECASE)
 _KEYS = {"angle_unit": str, "joints": dict, "trials": dict, "base": dict}
 
@@ -250,7 +244,7 @@ def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path,
     tables, plates = list[Path](), list[Path]()
     for path in files:
         with suppress(BiodanceError):
-            is_table = path.suffix.lower() in _ENCODER_TABLES
+            is_table = path.suffix.lower() in (".csv", ".parquet")
             if is_table and joints & set(read_cells(read_bytes(path), path, least=2).labels):
                 tables.append(path)
                 continue
@@ -282,7 +276,7 @@ def _plate_of(table: Path, plates: list[Path]) -> Path:
 
 
 def _stem(path: Path) -> str:
-    return _ENDS.sub("", path.stem) or path.stem
+    return re.sub(r"(?i)[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", "", path.stem) or path.stem
 
 
 def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: dict[str, str]) -> RobotTrial:

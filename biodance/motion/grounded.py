@@ -22,7 +22,7 @@ from biodance.motion.kinematics import poses
 from biodance.motion.track import smooth
 from biodance.records import SIDES, Array, Markers, Motion, Wrench, runs
 from biodance.records.motion import Encoders
-from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, wrench_about_point
+from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, turned_wrench, wrench_about_point
 
 _FAR = 0.02  # m RMS: markers so far from where they are said to be are not those
 
@@ -385,10 +385,8 @@ def on_motion_clock(measured: Wrench, time: Array, fit: PlateFit) -> Array:
 
 def from_plate(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
     """Return a wrench (T, 6) about the lab origin in a frame at ``place`` m, turned by ``yaw`` rad about z."""
-    near = wrench_about_point(wrench, np.array([*place, 0.0]))
-    turn = elementary_rotation("z", yaw)
-    # Rows times R are R' applied to each vector: lab to the turned frame.
-    return np.concatenate([near[:, :3] @ turn, near[:, 3:] @ turn], axis=1)
+    # R' leads from the lab to the turned frame.
+    return turned_wrench(wrench_about_point(wrench, np.array([*place, 0.0])), elementary_rotation("z", yaw).T)
 
 
 def _path(wrench: Array) -> NDArray[np.complex128]:
@@ -447,6 +445,4 @@ def _peak(values: Array, k: int) -> float:
 
 def onto_plate(wrench: Array, fit: PlateFit) -> Array:
     """Return a wrench (T, 6) in the first standing sole's frame in that of the plate; the inverse of `from_plate`."""
-    turn = elementary_rotation("z", fit.yaw)
-    turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)
-    return wrench_about_point(turned, -np.array([*fit.place, 0.0]))
+    return wrench_about_point(turned_wrench(wrench, elementary_rotation("z", fit.yaw)), -np.array([*fit.place, 0.0]))

@@ -27,19 +27,14 @@ from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
 if TYPE_CHECKING:
     import pandas as pd
 
-_NEARLY, _MOST = 0.85, 3
-"""Share of the best alignment's gain from which on another one is looked at, and how many of them."""
-_SAME = 0.03
-"""s between the delays of two refined poses that are one."""
-_CLEARLY = 10.0
-"""Natural logarithms by which the wrench must prefer one to the other."""
-
 
 def rival_delays(
     hypotheses: tuple[Alignment, ...], found: Refined, refine: Callable[[FramePose], Refined]
 ) -> tuple[Alignment, ...]:
-    """Return the hypotheses after the first, refined to ``found``, that are not clearly worse."""
-    near = [one for one in hypotheses[1:] if one.gain > _NEARLY * hypotheses[0].gain][:_MOST]
+    """Return the hypotheses after the first, refined to ``found``, that are not clearly worse: of the three that
+    explain most, those that explain 85 % of it.
+    """
+    near = [one for one in hypotheses[1:] if one.gain > 0.85 * hypotheses[0].gain][:3]
     return tuple(one for one in near if _remains(one, found, refine))
 
 
@@ -50,11 +45,11 @@ def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refin
         other = refine(one.pose)
     except TrialRefused:
         return False
-    if abs(other.pose.delay - found.pose.delay) < _SAME:
+    if abs(other.pose.delay - found.pose.delay) < 0.03:  # refined, both are one
         return False
     # Log likelihood ratio: half the difference of the sums of squares (mean square times rows).
     worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
-    return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > _CLEARLY)
+    return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > 10.0)
 
 
 _SURE = 1.645
@@ -63,10 +58,6 @@ simulated trials that pass 23 are within all limits."""
 _STRANGE = 7.5
 """Misfit of a loaded sample (of 12) above which the movement is not the one that the plates felt: 39 true pairs have up
 to 6.6."""
-_STRANGE_WRENCH = 5.0
-"""Mean square of the wrench's whitened rows above which it is not this movement: true pairs have up to 2."""
-_ODD_FEET = 6.0
-"""Mean square of the feet's whitened rows above which the plates do not lie as their file says."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +227,8 @@ def concluded(
 
 def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> str:
     """Return why the pose is not believed at all; "" where it is."""
-    if found.rows >= ENOUGH_ROWS and found.fit > _STRANGE_WRENCH:
+    # Mean square of the wrench's whitened rows: true pairs have up to 2.
+    if found.rows >= ENOUGH_ROWS and found.fit > 5.0:
         return (
             f"The forces do not fit this movement (the wrench misses by {np.sqrt(found.fit):.1f} times "
             "what is usual): they are of another trial or person. Give the two files of one trial."
@@ -248,7 +240,7 @@ def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> st
         )
     if rivals:
         return _rivalry(best, rivals[0])
-    if found.misfit > _ODD_FEET:
+    if found.misfit > 6.0:
         return (
             f"The pressure does not lie in the feet as it does in people (misfit {found.misfit:.1f}, 1 expected): the "
             "plates do not lie to one another as their file says, or it is another movement. Give one plate at a time."
@@ -305,7 +297,6 @@ def _placed(plate: Plate, loaded: bool, found: Refined) -> PlacedPlate:
 
 _MARK = "registration.json"
 """Name of the file that says that a folder was written by `biodance register`."""
-_BESIDE = (".mp", ".vsk", ".enf", ".toml")  # What belongs to a session beside its recordings
 
 
 def registered_folder(folder: Path, *, force: bool) -> Path:
@@ -370,7 +361,7 @@ def _copy_beside(session: Session, trial: Trial, folder: Path) -> None:
         if static.source.path != trial.source.path:
             shutil.copyfile(static.source.path, folder / static.source.path.name)
     for file in sorted(own.iterdir()):
-        if file.is_file() and file.suffix.lower() in _BESIDE:
+        if file.is_file() and file.suffix.lower() in (".mp", ".vsk", ".enf", ".toml"):
             shutil.copyfile(file, folder / file.name)
     for name in FILES:
         if (own.resolve().parent / name).is_file() and not (folder / name).exists():

@@ -18,16 +18,9 @@ from biodance.lab.prepare import force_filter, low_pass
 from biodance.records import Array, Markers, Mask, Motion, Plate, Trial, Wrench, freeze
 from biodance.records.motion import BY_FRAME
 from biodance.settings import COP_FORCE, Settings
-from biodance.spatial import axis_rotation, wrench_about_origin, zero_moment_point
+from biodance.spatial import axis_rotation, turned_wrench, wrench_about_origin, zero_moment_point
 
 _UP = np.array([0.0, 0.0, 1.0])
-_RATE = 200.0
-"""Hz at which low-passed forces are kept between two looks: ten times the default cut-off."""
-
-_LOADED = 50.0
-"""N: somebody stood on a plate that carried more."""
-_UNSIZED = "MOT"
-"""Format of recordings that does not say where a plate ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +56,7 @@ class FramePose:
     def wrench(self, value: Array) -> Array:
         """Return wrenches (..., 6) about the file's origin as wrenches about the room's."""
         # Both vectors turn about the file's origin; then the moment is taken to the room's.
-        turned = np.concatenate([value[..., :3] @ self.turn.T, value[..., 3:] @ self.turn.T], axis=-1)
-        return wrench_about_origin(turned, self.shift)
+        return wrench_about_origin(turned_wrench(value, self.turn), self.shift)
 
     def in_room(self, plate: Plate, time: Array, value: Array) -> Plate:
         """Return a plate of the file in the room, with what it recorded, ``value`` (T, 6) about the file's origin."""
@@ -95,8 +87,8 @@ class Forces:
 
     @property
     def loaded(self) -> Mask:
-        """(P,) whether somebody ever stands on a plate."""
-        return np.asarray(self.value[:, :, 2].max(axis=1) > _LOADED)
+        """(P,) whether somebody ever stands on a plate: it carries more than 50 N."""
+        return np.asarray(self.value[:, :, 2].max(axis=1) > 50.0)
 
     @property
     def height(self) -> float:
@@ -130,10 +122,11 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     raw = np.stack([plate.wrench.value for plate in trial.plates])
     if not np.isfinite(raw).all():
         raise TrialRefused(f"{trial.source.path}: some force samples are not numbers. Export the file again.")
-    rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // _RATE))
+    # Kept at 200 Hz, ten times the default cut-off.
+    rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // 200.0))
     value = np.stack([low_pass(one, rate, force_filter(settings)) for one in raw])[:, ::step]
     spline = make_interp_spline(time[::step], value, k=3, axis=1)
-    return Forces(trial.plates, time[::step], value, spline, trial.source.format != _UNSIZED)
+    return Forces(trial.plates, time[::step], value, spline, trial.source.format != "MOT")
 
 
 def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
@@ -171,8 +164,6 @@ _STEP, _EVERY = 0.02, 0.04
 """s between two delays, and between two samples."""
 _LEAST = 0.4
 """s of loaded plates, and of shared time."""
-_APART = 0.1
-"""s between the delays of two hypotheses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,34 +177,26 @@ class Alignment:
     misfit: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """Complex numbers over the loaded samples: measured ``cop`` m, ``shear`` N; needed the same; ``lift`` the
-    squared misfit of the vertical force.
+def _aligned(
+    cop: Array, shear: Array, needed_cop: Array, needed_shear: Array, lift: Array
+) -> tuple[complex, complex, Array]:
+    """Return turn and shift (complex) and the loss (n,) of every loaded sample: complex numbers of the measured ``cop``
+    m and ``shear`` N, and of the needed ones; ``lift`` the squared misfit of the vertical force.
     """
-
-    cop: Array
-    shear: Array
-    needed_cop: Array
-    needed_shear: Array
-    lift: Array
-
-    def aligned(self) -> tuple[complex, complex, Array]:
-        """Return turn and shift (complex) and the loss (n,) of every sample."""
-        # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
-        weight = 1.0 / (1.0 + self.lift / _OUTLIER) ** 2
-        for _ in range(4):
-            centre, needed = (np.sum(weight * x) / weight.sum() for x in (self.cop, self.needed_cop))
-            # the argument of sum conj(a) b is the turn that carries a onto b
-            both = np.sum(weight * np.conj(self.cop - centre) * (self.needed_cop - needed)) / _PRESSURE**2
-            # Shear is a vector without a place: nothing is centred.
-            both += np.sum(weight * np.conj(self.shear) * self.needed_shear) / _SHEAR**2
-            turn = complex(np.exp(1j * np.angle(both)))
-            apart = np.abs(self.needed_cop - needed - turn * (self.cop - centre)) ** 2 / _PRESSURE**2
-            loss = apart + np.abs(self.needed_shear - turn * self.shear) ** 2 / _SHEAR**2 + self.lift
-            weight = 1.0 / (1.0 + loss / _OUTLIER) ** 2
-        # p = turn (c - c0) + p0, so the shift is p0 - turn c0.
-        return turn, complex(needed - turn * centre), loss / (1.0 + loss / _OUTLIER)
+    # Geman and McClure: the loss u / (1 + u / c) has the slope 1 / (1 + u / c)², the weight of the next round.
+    weight = 1.0 / (1.0 + lift / _OUTLIER) ** 2
+    for _ in range(4):
+        centre, needed = (np.sum(weight * x) / weight.sum() for x in (cop, needed_cop))
+        # the argument of sum conj(a) b is the turn that carries a onto b
+        both = np.sum(weight * np.conj(cop - centre) * (needed_cop - needed)) / _PRESSURE**2
+        # Shear is a vector without a place: nothing is centred.
+        both += np.sum(weight * np.conj(shear) * needed_shear) / _SHEAR**2
+        turn = complex(np.exp(1j * np.angle(both)))
+        apart = np.abs(needed_cop - needed - turn * (cop - centre)) ** 2 / _PRESSURE**2
+        loss = apart + np.abs(needed_shear - turn * shear) ** 2 / _SHEAR**2 + lift
+        weight = 1.0 / (1.0 + loss / _OUTLIER) ** 2
+    # p = turn (c - c0) + p0, so the shift is p0 - turn c0.
+    return turn, complex(needed - turn * centre), loss / (1.0 + loss / _OUTLIER)
 
 
 def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -> tuple[Alignment, ...]:
@@ -242,7 +225,7 @@ def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -
     # Four times finer around the highest peak; the others are looked at as they are.
     fine = peaks[0].pose.delay + np.arange(-_STEP, 1.05 * _STEP, _STEP / 4)
     best = max(_scanned(motion, needed, forces, height, fine), key=lambda one: one.gain)
-    return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > _APART))
+    return (best, *(one for one in peaks[1:] if abs(one.pose.delay - best.pose.delay) > 0.1))
 
 
 def _scanned(
@@ -256,14 +239,18 @@ def _scanned(
     for delay in map(float, delays):
         samples = _samples(motion, needed, forces, delay, height)
         if samples is not None:
-            turn, shift, loss = samples.aligned()
+            turn, shift, loss = _aligned(*samples)
             pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
             # The loss of a sample stays below `_OUTLIER`: each one that fits adds, none takes off.
             yield Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
 
 
-def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height: float) -> _Samples | None:
-    """Return the samples in which the plates are loaded under one delay; None where they are too few."""
+def _samples(
+    motion: Motion, needed: Array, forces: Forces, delay: float, height: float
+) -> tuple[Array, Array, Array, Array, Array] | None:
+    """Return the samples in which the plates are loaded under one delay, as `_aligned` takes them; None where they are
+    too few.
+    """
     every = max(1, round(_EVERY * motion.rate))
     time, value = motion.time[::every], needed[::every]
     measured = forces.during(time + delay).sum(axis=0)
@@ -275,4 +262,4 @@ def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height
         return None
     # A plane as complex numbers: x + iy.
     a, b, c, d = (x[use, 0] + 1j * x[use, 1] for x in (here, measured, there, value))
-    return _Samples(a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2)
+    return a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2

@@ -22,7 +22,6 @@ _PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
 _SCALES, _RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
-_RESAVE_IT = "export the trial again from the recording software."
 _NEEDED = {
     "POINT": {"USED", "SCALE", "RATE", "DATA_START", "FRAMES", "LONG_FRAMES", "LABELS", "UNITS"},
     "ANALOG": {"USED", "LABELS", "GEN_SCALE", "SCALE", "OFFSET", "UNITS", "FORMAT", "RATE"},
@@ -160,7 +159,7 @@ def _left_out(known: dict[str, ParameterValue], group: str, name: str, values: l
     if name.rstrip("0123456789") in _NEEDED.get(group, ()):
         raise FileRefused(
             f"{where}: {twice}, and the file cannot be read without it. Delete the wrong one, for example in Mokka or "
-            f"with ezc3d, or {_RESAVE_IT}"
+            f"with ezc3d, or export the trial again from the recording software."
         )
     filled = [value for value in values if isinstance(value, list) or value.any()]
     del known[name]

@@ -8,7 +8,7 @@ import subprocess
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -129,22 +129,7 @@ def _same(one: Array, other: Array) -> bool:
 
 
 _METRES = {**METRES, "dm": 1e-1, "in": 0.0254}
-_PREFIXES = {"mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
-_SPELLINGS = {
-    **{
-        f"{prefix}{metre}": unit
-        for unit, prefix in _PREFIXES.items()
-        for metre in ("meter", "meters", "metre", "metres")
-    },
-    **{unit: unit for unit in _METRES},
-    **dict.fromkeys(("inch", "inches"), "in"),
-}
-
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
-_BELIEVABLE = (0.05, 4.75)
-"""Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
-overruled.
-"""
 
 
 def metres_per_unit(
@@ -161,9 +146,11 @@ def metres_per_unit(
         The unit is missing and neither markers nor plates tell it.
     """
     written = next(iter(texts(parameters, "POINT", "UNITS")), "")
-    unit = _SPELLINGS.get(written.strip(" .").casefold(), "")
+    unit = re.sub(r"met(er|re)s?$", "m", written.strip(" .").casefold())
+    unit = {"millim": "mm", "centim": "cm", "decim": "dm", "inch": "in", "inches": "in"}.get(unit, unit)
     size, expected, what = _size(parameters, points)
-    if unit and (math.isnan(size) or _BELIEVABLE[0] <= size * _METRES[unit] <= _BELIEVABLE[1]):
+    # From the markers on a hand to a person who lies or leaps.
+    if unit in _METRES and (math.isnan(size) or 0.05 <= size * _METRES[unit] <= 4.75):
         return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
     if math.isnan(size) and not np.isfinite(points).any() and not parameter_numbers(parameters, *_CORNERS).size:
         return _METRES["mm"], ("The file holds no lengths, so its unit of length does not matter.",), ()
@@ -195,10 +182,6 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
 
 _FRAMES = 4096  # Frames looked at at once: little memory, however long the recording
 
-_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
-"""Parameters of POINT in which the results are listed; POINT:TYPE_GROUPS may name more."""
-
-_RESULT = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF|Cent(re|er)OfMass(Floor)?)$")
 _BONE = re.compile(r"(?P<bone>.{3,})[OALP]$")
 _UNLABELLED = re.compile(r"^(\*\d*|[Uu]\d+|[Uu]nlabell?ed.*|[Uu]ncertain.*)?$")
 
@@ -216,14 +199,16 @@ def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, .
     The axes of a bone are four points whose names differ in the last letter: origin, anterior, lateral, proximal
     (``PELO``, ``PELA`` ...).
     """
-    declared = {group.upper() for group in texts(parameters, "POINT", "TYPE_GROUPS")[::2]} - {"MARKERS", "LABELS"}
-    listed = {label for group in declared | set(_GROUPS) for label in texts(parameters, "POINT", group)}
+    groups = {group.upper() for group in texts(parameters, "POINT", "TYPE_GROUPS")[::2]} - {"MARKERS", "LABELS"}
+    groups |= {"ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS"}
+    listed = {label for group in groups for label in texts(parameters, "POINT", group)}
     listed |= {split_label(label)[1] for label in listed}
     bones = Counter(match["bone"] for label in set(labels) if (match := _BONE.match(label)))
     found = []
     for column, label in enumerate(labels):
         name, bone = split_label(label)[1], _BONE.match(label)
-        if {label, name} & listed or _RESULT.search(name) or (bone and bones[bone["bone"]] == 4):
+        result = re.search(r"(Angles?|Forces?|Moments?|Powers?|GRF|Cent(re|er)OfMass(Floor)?)$", name)
+        if {label, name} & listed or result or (bone and bones[bone["bone"]] == 4):
             found.append(column)
     return tuple(found)
 
@@ -292,14 +277,12 @@ def read_raw(path: str | Path) -> RawC3d:
     path = Path(path)
     content, parameters, layout, history = open_c3d(path)
     points, analog = numbers = read_numbers(content, layout)
-    labels = point_labels(parameters, layout)
-    smells = _smells(numbers, labels, layout, parameters, path)
     for values in numbers:
         values.setflags(write=False)
-    return RawC3d(
+    raw = RawC3d(
         path=path,
         sha256=hashlib.sha256(content).hexdigest(),
-        labels=labels,
+        labels=point_labels(parameters, layout),
         points=points,
         rate=layout.rate,
         first_frame=layout.first_frame,
@@ -308,10 +291,12 @@ def read_raw(path: str | Path) -> RawC3d:
         analog_units=_fit(texts(parameters, "ANALOG", "UNITS"), layout.channels),
         analog_rate=layout.analog_rate,
         parameters=parameters,
-        warnings=(*layout.notes, *layout.remarks, *smells),
+        warnings=(*layout.notes, *layout.remarks),
         history=history,
         layout=layout,
     )
+    smell = _smell(raw, layout)
+    return replace(raw, warnings=(*raw.warnings, smell)) if smell else raw
 
 
 def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout, tuple[str, ...]]:
@@ -359,30 +344,28 @@ def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:
     return _fit(texts(parameters, "POINT", "LABELS"), layout.points)
 
 
-def _smells(
-    numbers: _Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
-) -> tuple[str, ...]:
-    """Have suspicious numbers judged by a second reader; return its judgement, or refuse."""
-    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
+def _smell(raw: RawC3d, layout: Layout) -> str:
+    """Have suspicious numbers judged by a second reader; return its judgement, or refuse; "" where nothing is odd."""
+    no_markers = {*raw.outputs, *raw.nameless}
     markers = [column for column in range(layout.points) if column not in no_markers]
-    points, leaps = numbers[0], 0
+    points, leaps = raw.points, 0
     with suppress(FileRefused):  # where the unit is not known, no distance is
-        metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
+        metre = 1.0 / metres_per_unit(raw.parameters, spread_frames(points)[:, markers], where="")[0]
         for start in range(0, len(points), _FRAMES):
             step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
             leaps += int(np.count_nonzero(any_coordinate(step > _LEAP * metre)))
     if not leaps and not layout.notes:
-        return ()
-    opinion = second_opinion(path, numbers, layout)
+        return ""
+    opinion = second_opinion(raw.path, (points, raw.analog), layout)
     jump = f"Markers jump by more than {_LEAP:g} m between two frames in {leaps} places"
     smell = jump if leaps else "Header and parameters disagree"
     if opinion == "refuted":
         raise FileRefused(
-            f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}"
+            f"{raw.path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}"
         )
     if opinion == "confirmed":
-        return (f"{smell}; ezc3d finds the same numbers.",)
-    return (f"{smell}; {opinion}, so only biodance has read these numbers.",)
+        return f"{smell}; ezc3d finds the same numbers."
+    return f"{smell}; {opinion}, so only biodance has read these numbers."
 
 
 def _fit(names: list[str], count: int) -> tuple[str, ...]:

@@ -21,7 +21,6 @@ from biodance.lab.plain_text import refuse_present, write_whole
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, assign, frozen_array
 
-_NEAR = 0.1  # s: an event that the file has already within this time is not written again
 _Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
 _UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
 """Unit of a kind of results where the parameter of POINT (`_unit_name`) declares none."""
@@ -217,7 +216,7 @@ def _add_events(file: Any, events: list[Any]) -> None:
     elif events and group:
         del file["parameters"]["EVENT"]  # a group without any event, often without the parameters that events need
     for time, context, label in events:
-        if not any(abs(time - when) < _NEAR and (context, label) == (side, name) for when, side, name in known):
+        if not any(abs(time - when) < 0.1 and (context, label) == (side, name) for when, side, name in known):
             file.add_event([float(time // 60), float(time % 60)], context=context, label=label, description="biodance")
 
 

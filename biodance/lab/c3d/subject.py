@@ -44,16 +44,6 @@ doi:10.1016/S1050-6411(00)00027-4). What can mean two muscles (GM) is not among 
 """
 _KNOWN = {short: muscle for muscle, names in _MUSCLES.items() for short in names.split()}
 _MILLIVOLTS = {"v": 1e3, "mv": 1.0, "uv": 1e-3, "µv": 1e-3, "μv": 1e-3}
-_SLOWEST = 500.0
-"""Hz: what is sampled slower holds no raw EMG, whose power lies up to 250 Hz and more (Hermens et al. 2000)."""
-_HIGH_PASS = 20.0
-"""Hz, against skin and cables that move (De Luca et al. 2010, doi:10.1016/j.jbiomech.2010.01.027)."""
-_LOW_PASS = 6.0
-"""Hz of the envelope (Winter 2009, Biomechanics and Motor Control of Human Movement, ISBN 978-0-470-39818-0)."""
-_RECTIFIED = 0.02
-"""Share of its largest value within which the lowest one of a channel lies that was rectified already: raw EMG goes as
-far below zero as above, and beside an offset of the amplifier nothing comes near zero.
-"""
 _SILENT = 0.02
 """Share of the file's strongest envelope under which nothing is connected: in 30 recordings of four laboratories empty
 channels have 0.1 to 1.7 %, muscles 2.2 % and more.
@@ -78,12 +68,15 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
     ``rate`` Hz; the first of those that name the same. Channels that read one value, or nearly nothing (`_SILENT`),
     have none.
 
-    High-passed, rectified, low-passed, each a second-order Butterworth run forth and back.
+    High-passed at 20 Hz, against skin and cables that move (De Luca et al. 2010, doi:10.1016/j.jbiomech.2010.01.027),
+    rectified, low-passed at 6 Hz (Winter 2009, Biomechanics and Motor Control of Human Movement, ISBN
+    978-0-470-39818-0), each a second-order Butterworth run forth and back.
     """
     from scipy.signal import butter, sosfiltfilt
 
     found: dict[tuple[str, str], EmgEnvelope] = {}
-    if not rate >= _SLOWEST or len(analog) < rate / 2:
+    # What is sampled slower holds no raw EMG, whose power lies up to 250 Hz and more (Hermens et al. 2000).
+    if not rate >= 500.0 or len(analog) < rate / 2:
         return ()
     time = np.arange(len(analog)) / rate
     for column, label in enumerate(labels):
@@ -96,10 +89,11 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
         unit = units[column].strip() if column < len(units) else ""
         factor = _MILLIVOLTS.get(unit.lower(), 1.0)
         told = "mV" if unit.lower() in _MILLIVOLTS else unit
-        # What goes below zero is not rectified yet.
-        if abs(value.min()) > _RECTIFIED * np.abs(value).max():
-            value = np.abs(sosfiltfilt(butter(2, _HIGH_PASS, "high", fs=rate, output="sos"), value - value.mean()))
-        envelope = np.asarray(np.maximum(sosfiltfilt(butter(2, _LOW_PASS, fs=rate, output="sos"), value), 0.0))
+        # What goes below zero is not rectified yet: raw EMG goes as far below zero as above, and beside an offset of
+        # the amplifier nothing comes near zero.
+        if abs(value.min()) > 0.02 * np.abs(value).max():
+            value = np.abs(sosfiltfilt(butter(2, 20.0, "high", fs=rate, output="sos"), value - value.mean()))
+        envelope = np.asarray(np.maximum(sosfiltfilt(butter(2, 6.0, fs=rate, output="sos"), value), 0.0))
         found[named] = EmgEnvelope(*named, told, time, factor * envelope)
     strongest = max((one.value.max() for one in found.values()), default=0.0)
     return tuple(one for one in found.values() if one.value.max() > _SILENT * strongest)
@@ -116,10 +110,6 @@ def muscle_of(label: str) -> tuple[str, str] | None:
         if match and muscle:
             return muscle, "left" if match["side"].lower().startswith("l") else "right"
     return None
-
-
-_SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
-_WORDS = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +159,10 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FootEvent, ...]:
     first = (layout.first_frame - 1) / layout.rate
     found = []
     words = zip(times.T, texts(parameters, "EVENT", "CONTEXTS"), texts(parameters, "EVENT", "LABELS"), strict=False)
+    sides = {"left": "left", "right": "right", "l": "left", "r": "right"}
+    kinds = {"foot strike": True, "foot off": False, "toe off": False, "heel strike": True}
     for (minutes, seconds), context, label in words:
-        side, down = _SIDES.get(context.strip().lower()), _WORDS.get(label.strip().lower())
+        side, down = sides.get(context.strip().lower()), kinds.get(label.strip().lower())
         if side is not None and down is not None:
             found.append(FootEvent(float(60 * minutes + seconds - first), side, down, "file"))
     return tuple(sorted(found, key=lambda one: one.time))
@@ -184,12 +176,6 @@ class MarkerLabels:
     names: tuple[str, ...]
     history: tuple[str, ...]
     warnings: tuple[str, ...]
-
-
-_OBJECT = 6
-"""Markers of a thing at most (a club, a wheel, a probe): three on each of two rigid parts. Fewer than seven markers
-show no pelvis with two legs.
-"""
 
 
 def subjects_in(path: Path) -> tuple[str, ...]:
@@ -208,7 +194,9 @@ def subjects_of(labels: Sequence[str], parameters: Parameters) -> tuple[str, ...
 def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
     """Return those of the prefixes, one for each marker, that name people; all where nobody carries many."""
     counts = Counter(prefixes)
-    enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
+    # A thing (a club, a wheel, a probe) has six markers at most, three on each of two rigid parts; fewer than seven
+    # show no pelvis with two legs.
+    enough = {prefix for prefix, count in counts.items() if count > 6}
     return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))
 
 

@@ -14,7 +14,7 @@ from biodance.lab.c3d.subject import as_written
 from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.decode import plate_axes
 from biodance.records import Array, Markers, Plate, Trial, assign, freeze, frozen_array
-from biodance.spatial import wrench_about_point
+from biodance.spatial import turned_wrench, wrench_about_point
 
 FileValue = str | Sequence[str] | ArrayLike
 _FileParameters = Mapping[str, Mapping[str, FileValue]]
@@ -294,5 +294,5 @@ def write_trial(trial: Trial, path: Path) -> None:
 
 def plate_recording(plate: Plate) -> PlateRecording:
     """Return what a plate of TYPE 2 records: the wrench in its own axes, about the centre of its surface."""
-    axes, wrench = plate_axes(plate.corners), wrench_about_point(plate.wrench.value, plate.centre)
-    return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([wrench[:, :3] @ axes, wrench[:, 3:] @ axes]))
+    own = turned_wrench(wrench_about_point(plate.wrench.value, plate.centre), plate_axes(plate.corners).T)
+    return PlateRecording(2, plate.corners, np.zeros(3), own)

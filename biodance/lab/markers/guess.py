@@ -38,12 +38,10 @@ _NEEDS = {one: (one,) for one in ("asis", "knee_lateral", "ankle_lateral", "heel
 """Landmarks that a body needs on each side, and what stands in for them."""
 _USEFUL = ("knee_medial", "ankle_medial", "acromion")
 """Landmarks that posture tells as well, for labels that say nothing."""
-_GAINS = (*_NEEDS, "psis", "mid_psis")
-"""Landmarks by whose marker a body gains: those, and one behind the pelvis."""
 _FREE = (*(f"{side}_{part}" for side in SIDES for part in (*_NEEDS, *_TOES[1:], "psis", *_USEFUL)), "mid_psis")
 """Landmarks that a label may be taken for that does not name them."""
 _AT = {place: j for j, place in enumerate(LANDMARKS)}
-_ENDS = ("lateral", "medial")
+
 _Said = Mapping[str, tuple[Meaning, ...]]
 
 
@@ -203,7 +201,7 @@ class _PersonLabels:
             if part_of(LANDMARKS[j]) not in usual:
                 cost[i, j] = _high(self._stand, LANDMARKS[j], labels[i])
         for side, joint in product(SIDES, ("elbow", "toe")):
-            lateral, medial = (_AT[f"{side}_{joint}_{end}"] for end in _ENDS)
+            lateral, medial = (_AT[f"{side}_{joint}_{end}"] for end in ("lateral", "medial"))
             either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
             out = upright.OUTWARDS[side] * self._shares[:, 0]
             middle = out[either].mean() if either.any() else 0.0
@@ -243,7 +241,8 @@ class _PersonLabels:
     def _costs(self, known: Mapping[str, str], fixed: Mapping[str, str], free: Mask) -> tuple[Array, Array]:
         """Return the costs (N, P) given the ``known`` landmarks, and those of rivals; what is ``fixed`` stays."""
         usual, away, labels = self._distances({}), self._distances(known), list(self.rows)
-        gain = np.array([_nats("needed") * (part_of(place) in _GAINS) for place in LANDMARKS])
+        # A body gains by a marker of what it needs, and by one behind the pelvis.
+        gain = np.array([_nats("needed") * (part_of(place) in (*_NEEDS, "psis", "mid_psis")) for place in LANDMARKS])
         placed = np.where(np.isfinite(away), np.minimum(away, _nats("farthest")), 0.0) + self._unplaced
         cost = self.words + placed - _nats("named") - gain
         open_ = free & self._at_ends_of_feet(np.minimum(usual, away), free, set(known.values()))

@@ -24,9 +24,6 @@ _COMPUTED = re.compile(
     re.IGNORECASE,
 )
 """Points that software computes from markers: joint centres, middles, centres of mass."""
-_AXES = ({"0", "1", "2", "3"}, {"O", "A", "L", "P"})
-"""Last signs of the four points that are the axes of a bone."""
-_SPOKEN = {"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l"}
 
 
 @dataclass(frozen=True)
@@ -46,10 +43,12 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     and an ending that nearly all labels share. Labels of unlabelled and of computed points are left out.
     """
     given = {label: label.rpartition(":")[2].strip() for label in labels}
+    # the four points that are the axes of a bone end so
     bones = {
         name[:-1]
         for name in given.values()
-        if not name[-2:-1].isdigit() and any({name[:-1] + end for end in ends} <= set(given.values()) for ends in _AXES)
+        if not name[-2:-1].isdigit()
+        and any({name[:-1] + end for end in ends} <= set(given.values()) for ends in ("0123", "OALP"))
     }
     given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
@@ -76,7 +75,8 @@ def _beginning(names: Sequence[str]) -> str:
 
 def _tokens_of(label: str) -> tuple[str, ...]:
     """Return the words of a label in small letters without accents, split at separators and capitals."""
-    spoken = "".join(_SPOKEN.get(sign, sign) for sign in label)
+    letters = {"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l"}
+    spoken = "".join(letters.get(sign, sign) for sign in label)
     flat = "".join(sign for sign in unicodedata.normalize("NFKD", spoken) if not unicodedata.combining(sign))
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", flat)
     return tuple(token for token in re.split(r"[^a-z0-9]+", spaced.lower()) if token)
@@ -154,17 +154,10 @@ def _mirrored(every: Mapping[str, Iterable[_Spelled]]) -> dict[tuple[str, str, s
 
 
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
-_WHOLE = {"head_front", "head_back"}
-"""Landmarks of the midline that are the mean of a right and a left marker."""
 _UNPAIRED = ("pelvis", "trunk_head")
 """Segments that have no side."""
 _JOINTS = ("hip", "knee", "ankle")
 """Joints whose bare names stand on both sides in every skeleton of video: HALPE, COCO, OpenPose, BlazePose."""
-_SKIN = ("asis", "psis", "knee_medial", "ankle_medial")
-"""Ends of landmarks that only a marker has: a trochanter may be called hip beside them."""
-_PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
-"""A number, as an ordinal or not, or a word, within a token."""
-_WAYS = 24  # Ways to cut the tokens of a label into words, beyond which the label says nothing
 
 
 @dataclass(frozen=True)
@@ -231,7 +224,9 @@ def joints_from_video(labels: Iterable[str]) -> tuple[str, ...]:
     name a spine of the pelvis or a medial side.
     """
     labels = tuple(labels)
-    if any(one.place.endswith(_SKIN) for ways in meanings_of(labels).values() for one in ways[:1]):
+    # Only a marker marks these: a trochanter may be called hip beside them.
+    on_the_skin = ("asis", "psis", "knee_medial", "ankle_medial")
+    if any(one.place.endswith(on_the_skin) for ways in meanings_of(labels).values() for one in ways[:1]):
         return ()
     said = {label: (one.side, "".join(one.rest)) for label, ways in _read(labels).items() for one in ways if one.side}
     plain, by_word = plain_labels(labels), {word: label for label, word in said.items()}
@@ -290,7 +285,7 @@ def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     landmarks = [
         (landmark if landmark in _MIDLINE else f"{side}_{landmark}", rank)
         for landmark, rank in spelled
-        if landmark in _WHOLE or bool(side) != (landmark in _MIDLINE)
+        if landmark in ("head_front", "head_back") or bool(side) != (landmark in _MIDLINE)
     ]
     found = landmarks + [(place, 500) for spelling in joined if (place := _segment_spelled(spelling, side))]
     if side and not found:
@@ -319,11 +314,14 @@ def _segment_spelled(spelling: str, side: str) -> str:
 def _composed(rest: tuple[str, ...]) -> list[tuple[str, int]]:
     """Return landmark and rank for tokens that name a region and a quality of it: KneeLat, lat_kn, EpiFemInt."""
     words, kinds_of = _vocabulary(), _vocabulary().words
-    parted = [part for token in rest for part in ([token] if token in kinds_of else _PARTS.findall(token))]
+    # Numbers, as ordinals or not, and words within a token.
+    number_or_word = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
+    parted = [part for token in rest for part in ([token] if token in kinds_of else number_or_word.findall(token))]
     known = [part for part in parted if part in kinds_of or part not in words.segments]  # a word is not cut
     cuts = [cut for token in known if (cut := _cuts(token))]
     found = []
-    for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
+    # A label that can be cut in more than 24 ways says nothing.
+    for way in product(*cuts) if cuts and sum(map(len, cuts)) <= 24 else ():
         parts = [part for cut in way for part in cut]
         if sum(map(len, parts)) < 2:
             continue

@@ -55,7 +55,6 @@ _NORMALISERS = "asis_width foot_length thigh_length shank_length upper_arm_lengt
 """Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid
 hip for the trunk.
 """
-_ORIGINS = ("segment", "mid_shoulder")
 _MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
 _FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
 
@@ -254,7 +253,8 @@ def _marker(path: Path, label: str, fields: Any) -> _SetMarker:
     where = f"{path}: marker {label}"
     if not isinstance(fields, dict) or "segment" not in fields:
         raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(MARKED_SEGMENTS)}.")
-    for key, legal in (("segment", MARKED_SEGMENTS), ("normaliser", _NORMALISERS.split()), ("origin", _ORIGINS)):
+    words = {"segment": MARKED_SEGMENTS, "normaliser": _NORMALISERS.split(), "origin": ("segment", "mid_shoulder")}
+    for key, legal in words.items():
         if key in fields and fields[key] not in legal:
             raise BiodanceError(f"{where} has the {key} {fields[key]!r}. Legal: {', '.join(legal)}.")
     unknown = [key for key in fields if key not in _MARKER_KEYS]
@@ -296,7 +296,6 @@ _MARKER_VALUES: dict[str, tuple[Callable[[Any], bool], str]] = {
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
-_MAPS = ("session.toml", "subject.toml")  # Files whose ``[markers] map`` is a marker set of its own
 GUESSED = "guessed "
 """How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
 
@@ -331,7 +330,7 @@ _PLACED = ("plug_in_gait", "isb_landmarks")
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
     """Return the marker set in a file, or of the map in a session.toml; read anew when the file has changed."""
-    if path.name not in _MAPS:
+    if path.name not in ("session.toml", "subject.toml"):
         return _made(name, _parse_marker_set(path), usual=path.stem not in _PLACED)
     table = read_toml(path).get("markers")
     given = table.get("map") if isinstance(table, dict) else None

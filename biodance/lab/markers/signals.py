@@ -16,25 +16,7 @@ _REPEATS = 5
 """Frames that repeat the one before to the last bit. In 62 trials of 14 laboratories no marker of somebody who moves
 does so four times in a row: cameras see 0.01 to 0.5 mm of noise.
 """
-_TRAVELLED = 0.01
-"""m that the other markers move in the median meanwhile: more than the coarsest numbers of a file hide (0.5 mm), and
-than somebody who stands for the static trial sways in that time.
-"""
-_SLOWER = 0.5
-"""Share of the step before it from which on a marker does not come to rest by and by, as computed movement does."""
 _LONGEST = 3  # Frames of a spike at most; what lasts longer may be another marker
-_OFF = 0.03
-"""m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after
-heel strikes of running at 2.5 and 3.5 m/s (10 people, 150 Hz), by 16 mm at most in runs, drop jumps and squats of 14
-laboratories.
-"""
-_FASTER = 100.0
-"""m/s² by which a marker must leave its way from one frame to the next: ten times gravity. What limbs do below it shows
-in the frames on both sides; impacts reach 200, but move a marker by millimetres.
-"""
-
-
-_TOLD = 8  # Times that are told one by one
 
 
 class MarkerFault(Enum):
@@ -59,7 +41,7 @@ class FaultyMarker:
         """Return the seconds of its frames among ``time`` (T,) s in words."""
         long = self.fault is MarkerFault.FROZEN
         at = [f"{time[start]:.2f}" + f" to {time[stop - 1]:.2f}" * long for start, stop in self.spans]
-        return ", ".join(at[:_TOLD]) + (f" and {len(at) - _TOLD} times more" if len(at) > _TOLD else "") + " s"
+        return ", ".join(at[:8]) + (f" and {len(at) - 8} times more" if len(at) > 8 else "") + " s"
 
     def sentence(self, where: str) -> str:
         """Return what was seen ``where`` (trials and seconds in words)."""
@@ -102,9 +84,6 @@ def without_faults(markers: Markers, faults: tuple[FaultyMarker, ...]) -> Marker
     return Markers(markers.names, markers.time, xyz)
 
 
-_FEWEST = 4  # Markers that must be seen; fewer may rest on something, or be rounded to the same digits
-
-
 def frozen_frames(xyz: Array) -> Mask:
     """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
     frames, into or out of which they move abruptly; nowhere in a recording that never moves, as a posture kept as many
@@ -117,7 +96,8 @@ def frozen_frames(xyz: Array) -> Mask:
     seen = ~any_coordinate(~np.isfinite(xyz))
     equal = ~any_coordinate(xyz[1:] != xyz[:-1]) | ~(seen[1:] | seen[:-1])
     repeats = np.zeros(len(xyz), dtype=bool)
-    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
+    # Fewer than four markers may rest on something, or be rounded to the same digits.
+    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= 4)
     if not repeats.any() or repeats.sum() >= len(repeats) - 1:
         return np.zeros(len(xyz), dtype=bool)
     steps = np.zeros(len(xyz))
@@ -159,7 +139,8 @@ def _frozen(xyz: Array) -> Mask:
                 with np.errstate(invalid="ignore"):
                     away = np.linalg.norm(xyz[start:stop, others] - xyz[start - 1, others], axis=2)
                 farthest = np.nan_to_num(away).max(axis=0, initial=0.0)
-                frozen[start:stop, k] = bool(farthest.size) and float(np.median(farthest)) > _TRAVELLED
+                # By more than the coarsest numbers of a file hide (0.5 mm), and than somebody who stands sways.
+                frozen[start:stop, k] = bool(farthest.size) and float(np.median(farthest)) > 0.01
     return frozen
 
 
@@ -169,8 +150,8 @@ def _breaks_off(steps: Array, start: int, stop: int) -> bool:
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
         if min(near, far) >= 0 and max(near, far) < steps.size:
             slower_yet = not 0 <= farther < steps.size or steps[far] < steps[farther]
-            # 1e-5 m: smaller steps are the last digits of a computed movement
-            if steps[near] > 1e-5 and not (steps[near] < _SLOWER * steps[far] and slower_yet):
+            # 1e-5 m: smaller steps are the last digits of a computed movement, which comes to rest by and by
+            if steps[near] > 1e-5 and not (steps[near] < 0.5 * steps[far] and slower_yet):
                 return True
     return False
 
@@ -205,9 +186,13 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
 
 
 def _limit(step: float) -> float:
-    """Return how far (m) a marker must be off its way, for frames every ``step`` s."""
-    # A change of acceleration moves a marker by about a dt².
-    return max(_OFF, _FASTER * step**2)
+    """Return how far (m) a marker must be off its way, for frames every ``step`` s: what skin, wands and heads of
+    markers cannot swing (4 to 9 mm after heel strikes of running at 2.5 and 3.5 m/s, 10 people, 150 Hz; 16 mm at most
+    in runs, drop jumps and squats of 14 laboratories), and what needs ten times gravity from one frame to the next.
+    """
+    # A change a of acceleration moves a marker by about a dt². What limbs do below 100 m/s² shows in the frames on
+    # both sides; impacts reach 200, but move a marker by millimetres.
+    return max(0.03, 100.0 * step**2)
 
 
 def _spikes(path: Array, step: float) -> tuple[Mask, float]:
@@ -237,11 +222,6 @@ def _spikes(path: Array, step: float) -> tuple[Mask, float]:
 # - Whatever is left stays NaN: the kinematics give it no weight.
 
 _FLANK = 6  # Seen frames that each side of a short gap must have
-_CARRIERS = 5  # At most so many neighbours carry a marker across a gap; at least three are needed
-_RIGID = 0.01
-"""m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
-_CLOSURE = 0.02
-"""m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
 
 
 @dataclass(frozen=True)
@@ -358,7 +338,7 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
     ways = ((rigid_fit(others[edge], others), own[edge]) for edge in (0, -1))
     forward, backward = (turn @ point + place for (turn, place), point in ways)
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
-    if closure > _CLOSURE:
+    if closure > 0.02:
         error = f"with an error of {1000 * closure:.0f} mm across the gap"
         return None, f"left unseen: {', '.join(carriers)} predict it {error}"
     # Linear blend: each prediction is exact at its own edge.
@@ -376,7 +356,8 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
         if same and not np.isnan(markers[label][gap.start - 1 : gap.stop + 1]).any():
             distance = np.linalg.norm(markers[label] - own, axis=1)
             spread[label] = float(np.nanstd(distance))
-    rigid = sorted((label for label, value in spread.items() if value < _RIGID), key=spread.__getitem__)[:_CARRIERS]
+    # The five whose distance varies least, by less than 0.01 m; at least three are needed.
+    rigid = sorted((label for label, value in spread.items() if value < 0.01), key=spread.__getitem__)[:5]
     if len(rigid) < 3:
         return []
     points = np.stack([markers[label][gap.start - 1] for label in rigid])

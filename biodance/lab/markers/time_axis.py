@@ -13,8 +13,6 @@ from biodance.errors import FileRefused
 from biodance.lab.markers.signals import faulty_markers, without_faults
 from biodance.records import Array, Markers, Mask, runs
 
-_ROUNDED = 0.2
-"""Share of a step by which a stamp may lie off equal steps: writers round the time column."""
 _HOLE = 2.5
 """Steps between two stamps from which on nothing is told between them: one row is missing at two."""
 LONGEST_STEP = 0.2
@@ -107,7 +105,7 @@ def time_axis(stamps: Array, *, where: str, row: str = "row") -> TimeAxis:
     if stamps.size < 2:
         return TimeAxis(stamps, stamps, False)
     even = np.linspace(stamps[0], stamps[-1], stamps.size)
-    if np.abs(stamps - even).max() <= _ROUNDED * (even[1] - even[0]):
+    if np.abs(stamps - even).max() <= 0.2 * (even[1] - even[0]):  # writers round the time column
         return TimeAxis(stamps, even, False)
     step = float(np.median(np.diff(stamps)))
     if step > LONGEST_STEP:
@@ -139,11 +137,6 @@ def _pieces(stamps: Array, known: Mask) -> list[tuple[int, int]]:
 
 
 _ROUNDS = 15
-_COMPONENTS = 3
-"""Principal components of the markers' movement whose paths are smoothed: what is left holds noise and little else."""
-_SLOW = 0.375
-"""Share of the rate of the rows at which the smooth paths have half their amplitude: people move more slowly."""
-_STILL = 0.01  # Of the mean squared speed: rows that are slower tell nothing of their instants
 _HIGHEST = 500.0  # Hz of cameras that are looked for
 _TICK = 0.25 / _HIGHEST  # s to which instants are rounded where rates are tried
 
@@ -172,7 +165,9 @@ def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
 
 
 def _paths(xyz: Array) -> Array | None:
-    """Return the principal components (S, c) m of the markers that are seen throughout; None without three."""
+    """Return the first three principal components (S, 3) m of the markers that are seen throughout: what is left holds
+    noise and little else; None without three markers.
+    """
     seen = xyz[:, np.isfinite(xyz).all(axis=(0, 2))]
     if seen.shape[1] < 3:
         return None
@@ -180,7 +175,7 @@ def _paths(xyz: Array) -> Array | None:
     columns = seen.reshape(len(seen), -1) - seen.mean(axis=0).ravel()
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
     # U S: paths along the principal directions, largest first.
-    return np.asarray((left * size)[:, :_COMPONENTS])
+    return np.asarray((left * size)[:, :3])
 
 
 def _on_grid(stamps: Array, paths: Array) -> tuple[Array, float] | None:
@@ -209,14 +204,14 @@ def _on_grid(stamps: Array, paths: Array) -> tuple[Array, float] | None:
 def _late(instants: Array, paths: Array) -> tuple[Array, Array]:
     """Return how much later (S,) s rows of ``paths`` (S, c) were seen, if smooth, and their squared speed (S,)."""
     rate = 1 / float(np.median(np.diff(instants)))
-    # A smoothing spline passes 1 / (1 + lam w⁴ / rate): half at w = 2 pi SLOW rate.
-    stiff = rate / (2 * np.pi * _SLOW * rate) ** 4
+    # A smoothing spline passes 1 / (1 + lam w⁴ / rate): half at 0.375 of the rows' rate; people move more slowly.
+    stiff = rate / (2 * np.pi * 0.375 * rate) ** 4
     smooth = [make_smoothing_spline(instants, path, lam=stiff) for path in paths.T]
     left = paths - np.stack([one(instants) for one in smooth], axis=1)
     speed = np.stack([one.derivative()(instants) for one in smooth], axis=1)
     square = np.sum(speed**2, axis=1)
     # path = smooth(t + late), so late = left · speed / speed², damped where the marker hardly moves.
-    return np.sum(left * speed, axis=1) / (square + _STILL * square.mean()), square
+    return np.sum(left * speed, axis=1) / (square + 0.01 * square.mean()), square
 
 
 def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | None:

@@ -19,7 +19,6 @@ from biodance.settings import STANDARD_GRAVITY, StandingRules
 
 WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
-_STILL = 0.02  # m, standard deviation over half a second beyond which a marker does not stand still
 _BLOCK = 0.05  # s: the force is averaged over blocks of this length before it is judged
 _MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
 """How far markers moved, kept as long as they live: reader, roles and checks ask for it."""
@@ -110,7 +109,8 @@ def posture_frames(markers: Markers) -> tuple[Mask, bool]:
     several = np.isfinite(near).all(axis=2).sum(axis=0) > 1
     if markers.time.size <= 2:
         return quiet, True
-    if several.any() and np.nanmedian(np.nanstd(near[:, several], axis=0).max(axis=1)) <= _STILL:
+    # A marker that stands still has a standard deviation of 0.02 m at most in half a second.
+    if several.any() and np.nanmedian(np.nanstd(near[:, several], axis=0).max(axis=1)) <= 0.02:
         return quiet, True
     height = np.sort(np.where(markers.seen, markers.xyz[:, :, 2], np.inf), axis=1)
     lowest = height[:, : max(1, len(markers.names) // 3)].mean(axis=1)
@@ -127,18 +127,25 @@ def median_places(markers: Markers, frames: Mask) -> dict[str, Array]:
     return {name: np.median(path[there], axis=0) for name, path, there in paths if there.any()}
 
 
+def on_the_ground(height: Array) -> Mask:
+    """Return where markers of feet, ``height`` (..., T) m, are within 0.03 m of their lowest place, below which single
+    frames do not count (5th percentile).
+    """
+    return np.asarray(height < np.nanpercentile(height, 5, axis=-1, keepdims=True) + 0.03)
+
+
+def as_high_as_ever(height: Array, among: Mask) -> Mask:
+    """Return which frames (T,) ``among`` these show a ``height`` (T,) m of somebody upright: within 0.02 m of the
+    highest (95th percentile); who squats or bends leans.
+    """
+    return among & (height > np.nanpercentile(height[among], 95) - 0.02) if among.any() else among
+
+
 OUTWARDS = {"right": 1.0, "left": -1.0}
 """Sign of a person's right on each side."""
-_ON_THE_SIDE = ("asis", "knee", "ankle", "heel", "toe", "acromion")
 _STRAIGHT = ("asis", "psis", "acromion")
 """Pairs that point right even where one leg is before the other."""
-_PAIRS = (*_STRAIGHT, "knee_lateral", "ankle_lateral", "heel", "toe", "toe_lateral")
-_FRONT_AND_BACK = (("toe", "{}_heel"), ("toe_lateral", "{}_heel"), ("asis", "{}_psis"), ("asis", "mid_psis"))
-"""Landmarks before others, of the same side where both have one."""
-_ABOVE = ("ankle_lateral", "asis")
-_FEET = ("_heel", "_toe", "_toe_lateral", "_toe_medial")
 _NEEDED = ("asis", "knee_lateral", "ankle_lateral", "heel", "toe")
-_STATURES = np.geomspace(0.85, 2.15, 40)  # m: statures that are tried
 
 
 @cache
@@ -195,7 +202,8 @@ class Standing:
         if side not in SIDES:
             return bool(abs(out) < bound("off_middle")) or place.startswith("head") or _height_of(place) is None
         own = OUTWARDS[side] * out
-        if own >= usual["widest"].get(part, np.inf) or (own <= -bound("across") and part.startswith(_ON_THE_SIDE)):
+        on_the_side = part.startswith(("asis", "knee", "ankle", "heel", "toe", "acromion"))
+        if own >= usual["widest"].get(part, np.inf) or (own <= -bound("across") and on_the_side):
             return False
         ankle, shoulder = (self.named.get(f"{side}_{end}", label) for end in ("ankle_lateral", "acromion"))
         _, before, lifted = self.shares([ankle])[0]
@@ -208,7 +216,8 @@ class Standing:
 
 def _from_left_to_right(known: Mapping[str, Array]) -> dict[str, Array]:
     """Return the vectors (3,) m from the left to the right landmark of each pair of which both are known."""
-    paired = [part for part in _PAIRS if known.keys() >= {f"right_{part}", f"left_{part}"}]
+    parts = (*_STRAIGHT, "knee_lateral", "ankle_lateral", "heel", "toe", "toe_lateral")
+    paired = [part for part in parts if known.keys() >= {f"right_{part}", f"left_{part}"}]
     return {part: known[f"right_{part}"] - known[f"left_{part}"] for part in paired}
 
 
@@ -227,7 +236,9 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     """
     known = {place: at[label] for place, label in named.items()}
     pairs = _from_left_to_right(known)
-    ends = [(f"{side}_{front}", back.format(side)) for side in SIDES for front, back in _FRONT_AND_BACK]
+    # Landmarks before others, of the same side where both have one.
+    front_and_back = (("toe", "{}_heel"), ("toe_lateral", "{}_heel"), ("asis", "{}_psis"), ("asis", "mid_psis"))
+    ends = [(f"{side}_{front}", back.format(side)) for side in SIDES for front, back in front_and_back]
     ahead = [known[front] - known[back] for front, back in ends if known.keys() >= {front, back}]
     if len(pairs) < 3 or not ahead:
         return None
@@ -243,7 +254,7 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
         )
     if any(pair @ right <= 0 for pair in pairs.values()):
         return "Of some pairs of markers the right one lies left of the left one: the sides are exchanged in part."
-    feet = [place[2] for name, place in known.items() if name.endswith(_FEET)]
+    feet = [place[2] for name, place in known.items() if part_of(name).startswith(("heel", "toe"))]
     floor = float(min(feet or (at[label][2] for label in plain_labels(at)))) - 0.02
     stature = _stature(known, floor)
     if not 0.6 < stature < 2.6:
@@ -256,7 +267,9 @@ def _middle(known: Mapping[str, Array], pairs: Iterable[str], forward: Array, st
     parts = list(pairs)
     both = [part for part in _STRAIGHT[:2] if part in parts] or parts
     middle = np.mean([known[f"{side}_{part}"] for part in both for side in SIDES], axis=0)
-    ankles, spines = ([known[place] for s in SIDES if (place := f"{s}_{part}") in known] for part in _ABOVE)
+    ankles, spines = (
+        [known[place] for side in SIDES if (place := f"{side}_{part}") in known] for part in ("ankle_lateral", "asis")
+    )
     ahead_of_ankles = usual_standing()["places"]["asis"]["at"][1] * stature * forward
     above = np.mean(ankles, axis=0) if len(ankles) == 2 else np.mean(spines or [middle], axis=0) - ahead_of_ankles
     # Only along the way ahead: the middle between the sides stays.
@@ -337,7 +350,7 @@ def _fitted(at: Mapping[str, Array], right: Array, offset: float) -> tuple[float
     person = np.hypot(out, along - np.median(along)) < bound("reach_m")
     low = float(up[person].min()) if person.any() else 0.0
     best = (float("inf"), 0.0, 0.0)
-    for stature in _STATURES:
+    for stature in np.geomspace(0.85, 2.15, 40):
         shares = np.stack([out, along, up - low], axis=1) / stature + [0.0, 0.0, bound("sole")]
         lateral = person & (np.abs(shares[:, 2] - 0.044) < 0.02) & (np.abs(shares[:, 0]) > 0.05)
         origins = np.unique(along[lateral].round(2))
@@ -369,22 +382,16 @@ def _misfit(shares: Array, origin: Array) -> Array:
     return np.asarray(np.minimum([*near, behind], 2 * bound("near")).sum(axis=0) + over**2)
 
 
-_UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
-_LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
-_HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
-"""Segments of the upper and of the lowest part of the body, for sets that nobody described."""
-_CLEARLY_TALLER = 1.3
-"""A body stands along an axis along which it is so many times as long: arms spread sideways stay below."""
-
-
 def axis_to_head(markers: Markers, known: MarkerSet | None) -> Array | None:
     """Return the signed coordinate axis (3,) from the feet to the head or pelvis in most frames, by what labels say of
     high and low markers; where they say nothing, the only way up in which somebody stands. None if neither tells it.
     ``known`` is the set of the labels (`recognise`).
     """
     few = Markers(markers.names, spread_frames(markers.time), spread_frames(markers.xyz))
+    upper = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
+    lower = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
     ends = [
-        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (_UPPER, _LOWER)
+        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (upper, lower)
     ]
     if not all(ends):
         # Read in the whole set or, where that says nothing, alone: sides do not matter.
@@ -392,7 +399,8 @@ def axis_to_head(markers: Markers, known: MarkerSet | None) -> Array | None:
         said = {label: together.get(label) or meanings(label) for label in markers.names}
         on = {label: ways[0].place for label, ways in said.items() if ways}
         on = {label: segment_of(place) if place in LANDMARKS else place for label, place in on.items()}
-        ends = [[few[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
+        groups = (("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank"))
+        ends = [[few[label] for label in on if on[label] in group] for group in groups]
     if not all(ends):
         return _only_way_to_stand(markers)
     top, bottom = (np.concatenate(points) for points in ends)
@@ -466,4 +474,4 @@ def body_is_tall_along_z(xyz: Array) -> bool:
     if not len(sides):
         return False
     extent = np.median(sides, axis=0)
-    return bool(extent[2] > _CLEARLY_TALLER * extent[1])
+    return bool(extent[2] > 1.3 * extent[1])

@@ -19,26 +19,12 @@ from biodance.settings import TOUCH_FORCE
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
 EDGE = 0.02  # m by which a sensor or a centre of pressure may lie beyond the edge
 FARTHEST_PRESSURE = 1.5  # m: a centre of pressure farther away has no meaning
-_FARTHEST_ORIGIN, _CLOSEST_SENSORS = 2.0, 0.05  # m
-_SENSORS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-"""Where the four sensors of a plate lie, in a and b along its x and y."""
-_LOADED, _CONTACT = 0.05, 0.1  # share of the peak from which on a plate is loaded; s over which it must be
-_BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
 _NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
 _SMALL = 30.0  # N, an offset that needs no further proof
 _FLAT = 5.0  # N, spread of the block means up to which a plate counts as quiet
 LARGEST_SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
-_SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
-_DEAD, _LONG = 1.5, 0.5
-"""N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
-
-
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 _NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
-_STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
-_SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
-_UNITS = {"m": 1.0, "mm": 0.001}
-_FOOT = 0.15  # m that a foot reaches beyond its markers and centres of pressure
 FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
 
 
@@ -89,6 +75,15 @@ class PlateReading:
         """The samples (S,) at which somebody is on the plate (`loaded_samples`)."""
         return loaded_samples(self.sensor, self.rate)
 
+    def under(self, xyz: Array) -> Mask:
+        """Return (...,) which markers ``xyz`` (..., 3) m are as low as those of a standing foot, and over the plate or
+        no more than 0.05 m beside it: so far a sole reaches beyond its markers.
+        """
+        away = xyz - self.corners.mean(axis=0)
+        # Rows are vectors: v @ axes is axes'v, in the plate's axes.
+        over = (np.abs((away @ self.axes)[..., :2]) <= self.half + 0.05).all(axis=-1)
+        return np.asarray(over & (np.abs(away[..., 2]) <= FOOT_HEIGHT))
+
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
     """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
@@ -96,10 +91,10 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
     fits = []
     for unit in dict.fromkeys((metres, 0.001, 1.0)):
         x, y, depth = np.abs(plate.origin * unit)
-        # Four sensors lie inside the outline and apart; one may lie beside it, as treadmills have it.
+        # Four sensors lie inside the outline and 0.1 m apart; one may lie beside it, as treadmills have it, by 2 m.
         beside = np.array([x, y])
-        inside = bool((beside >= _CLOSEST_SENSORS).all() and (beside <= half + EDGE).all())
-        if depth <= DEEPEST and max(x, y) <= _FARTHEST_ORIGIN and (inside or not four):
+        inside = bool((beside >= 0.05).all() and (beside <= half + EDGE).all())
+        if depth <= DEEPEST and max(x, y) <= 2.0 and (inside or not four):
             fits.append(unit)
     if fits and fits[0] == metres:
         return plate.origin * metres, ()
@@ -235,10 +230,9 @@ def _longest_unloaded(vertical: Array, rate: float) -> tuple[int, int] | None:
             small = abs(level) <= _SMALL
             # Standard deviation of a block mean of white noise, and half as much more.
             noise = 1.5 * float(vertical[(start + 1) * size : (stop - 1) * size].std()) / np.sqrt(size)
-            quiet = means[inner].std() <= (_FLAT if small else max(_DEAD, noise)) and length >= (
-                _SHORTEST if small else _LONG
-            )
-            if quiet and is_unloaded(level, means):
+            # A larger offset is only believed where the signal is as still as its own noise, and for longer.
+            most, least = (_FLAT, 0.12) if small else (max(1.5, noise), 0.5)
+            if means[inner].std() <= most and length >= least and is_unloaded(level, means):
                 found.append((small, length, (start + 1) * size, (stop - 1) * size))
     return max(found)[2:] if found else None
 
@@ -260,8 +254,10 @@ def is_unloaded(level: float, vertical: Array) -> bool:
     return at_an_end and -(high - low) <= load <= LARGEST_SHARE * (high - low)
 
 
-def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
-    """Return the means of ``values`` (S, ...) over whole blocks of ``length`` s (one at least), and samples a block."""
+def block_means(values: Array, rate: float, *, length: float = 0.04) -> tuple[Array, int]:
+    """Return the means of ``values`` (S, ...) over whole blocks of ``length`` s (one at least; by default two periods
+    of the mains), and samples a block.
+    """
     size = min(max(1, round(length * rate)), len(values))
     count = len(values) // size
     return values[: count * size].reshape(count, size, *values.shape[1:]).mean(axis=1), size
@@ -288,12 +284,14 @@ def sensor_wrench(kind: PlateType, signals: Array, origin: Array) -> Array:
         x, y = np.where(np.maximum(np.abs(x), np.abs(y)) > FARTHEST_PRESSURE, 0.0, (x, y))
         # p x F for p = (x, y, 0).
         return np.column_stack([fx, fy, fz, y * fz, -(x * fz), free + (x * fy - y * fx)])
+    # Where the four sensors lie, in a and b along the plate's x and y.
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
     wrench = np.zeros((len(kind.outputs), 6))
     for column, name in enumerate(kind.outputs):
         axis = "xyz".index(name[1])
         wrench[column, axis + 3 * (name[0] == "m")] = 1.0
         if sensors := [int(number) - 1 for number in name[2:]]:
-            place = np.append(_SENSORS[sensors].mean(axis=0) * np.abs(origin[:2]), 0.0)
+            place = np.append(corners[sensors].mean(axis=0) * np.abs(origin[:2]), 0.0)
             wrench[column, 3:] = np.cross(place, np.eye(3)[axis])
     return np.asarray(signals[:, : len(wrench)] @ wrench)
 
@@ -305,8 +303,8 @@ def loaded_samples(wrench: Array, rate: float) -> Mask:
     So a plate that only trembles under a neighbour's step does not count as loaded. ``wrench`` (S, 6) N, N·m in plate
     axes, either sign; ``rate`` Hz.
     """
-    means, size = block_means(wrench[:, 2], rate, length=_CONTACT)
-    threshold = max(TOUCH_FORCE, _LOADED * float(np.abs(means).max()))
+    means, size = block_means(wrench[:, 2], rate, length=0.1)
+    threshold = max(TOUCH_FORCE, 0.05 * float(np.abs(means).max()))
     lasting = np.repeat(np.abs(means) >= threshold, size)
     # The last block is not whole: as the one before.
     lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
@@ -355,7 +353,7 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
             f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used."
         )
     axes = plate_axes(lab)
-    if abs(axes[2, 2]) < _STEEPEST:
+    if abs(axes[2, 2]) < 0.7:  # the cosine of 45 degrees
         raise TrialRefused(
             f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). "
             "Check corners and lab axes."
@@ -402,28 +400,27 @@ def half_sides(corners: Array) -> Array:
 
 
 def around_pressures(points: Array, height: float) -> Array:
-    """Return the corners (4, 3) m around ``points`` (n, 2 or more) m with room for a foot, at a ``height`` m;
+    """Return the corners (4, 3) m around ``points`` (n, 2 or more) m with 0.15 m, room for a foot, at a ``height`` m;
     counter-clockwise seen from above.
     """
-    (x0, y0), (x1, y1) = np.nanmin(points, axis=0)[:2] - _FOOT, np.nanmax(points, axis=0)[:2] + _FOOT
+    (x0, y0), (x1, y1) = np.nanmin(points, axis=0)[:2] - 0.15, np.nanmax(points, axis=0)[:2] + 0.15
     return np.array([[x1, y1, height], [x0, y1, height], [x0, y0, height], [x1, y0, height]])
 
 
 def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
     """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    units = {"m": 1.0, "mm": 0.001}
     fits = [
-        name
-        for name, unit in _UNITS.items()
-        if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE
+        one for one, unit in units.items() if SHORTEST_SIDE <= unit * sides.min() <= unit * sides.max() <= LONGEST_SIDE
     ]
-    if any(np.isclose(_UNITS[name], metres) for name in fits) or len(fits) != 1:
+    if any(np.isclose(units[name], metres) for name in fits) or len(fits) != 1:
         return metres, []
     said = (
         f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the "
         "only unit that fits a plate."
     )
-    return _UNITS[fits[0]], [said]
+    return units[fits[0]], [said]
 
 
 def _refuse_disorder(lab: Array) -> None:
@@ -432,8 +429,8 @@ def _refuse_disorder(lab: Array) -> None:
     # Round a simple outline both pairs of opposite sides run against each other.
     if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
         return
-    for order, which in _SWAPS.items():
-        if _gap(lab[list(order)]) < _NOT_CLOSED:
+    for order, which in (([0, 1, 3, 2], "3 and 4 (or 1 and 2)"), ([0, 2, 1, 3], "2 and 3 (or 1 and 4)")):
+        if _gap(lab[order]) < _NOT_CLOSED:
             raise TrialRefused(
                 f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
                 "is +x+y, -x+y, -x-y, +x-y of the plate axes. Correct FORCE_PLATFORM:CORNERS."

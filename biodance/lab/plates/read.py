@@ -24,38 +24,14 @@ from biodance.lab.plates import (
     ToldPlate,
     declared_plates,
 )
-from biodance.lab.plates.decode import (
-    FOOT_HEIGHT,
-    LARGEST_SHARE,
-    PlateReading,
-    block_means,
-    decode_plate,
-    plate_axes,
-)
+from biodance.lab.plates.decode import LARGEST_SHARE, PlateReading, block_means, decode_plate, plate_axes
 from biodance.lab.plates.sense import left_out_said, sense_plates, with_loads_on_plates
 from biodance.records import Array, Defect, Markers, Plate, Trial, Wrench, grouped
 from biodance.records.attention import Doubt, WrongWeight
 from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE, CheckLimits, StandingRules
-from biodance.spatial import wrench_about_origin, wrench_about_point
+from biodance.spatial import turned_wrench, wrench_about_origin, wrench_about_point
 
-_STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
-_QUIET = 2.5
-"""N: largest standard deviation of what an empty plate reads, half the spread up to which `decode` calls one quiet; a
-foot that comes or goes changes it by far more.
-"""
-_SOMEBODY = 5 * TOUCH_FORCE  # N, the load of a plate from which on somebody is on it
 _CONTACT = 0.1  # s over which the plate's noise is averaged
-
-_FEWEST = 5
-"""Equal samples in a row that are no chance: where each of six channels repeats its number half of the time, as a
-coarse converter does at rest, all of them repeat it four times in six of a hundred million rows.
-"""
-
-
-_SCALE_OFF = 0.5
-"""Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
-_SCALE_RIGHT = 0.15
-"""Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
 
 
 def decode_plates(
@@ -76,7 +52,8 @@ def decode_plates(
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
         return done, lost, ()
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
-    if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
+    # A foot beside the plates costs less than half.
+    if not np.isfinite(gain).all() or (gain == 1).all() or 0.5 < share < 2:
         return done, lost, ()
     # A scale of zero, or none, cannot be undone.
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
@@ -84,7 +61,8 @@ def decode_plates(
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
     plain, lost_plain = _decode_each(stored, plates, metres, turn)
     whole = _weight_share(plain, mass)
-    if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
+    # Shoes, clothes and movement make a difference, too.
+    if len(plain) < len(done) or abs(whole - 1) > 0.15:
         return done, lost, ()
     said = (
         f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
@@ -119,12 +97,12 @@ def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
 def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
     """Return the readings of plates that are not dead, without constants where nobody steps on them; the dead ones."""
     alive, dead = [], []
-    stood_on = [markers is not None and _feet_on(one, markers) for one in readings]
+    stood_on = [markers is not None and bool(one.under(markers.xyz).any()) for one in readings]
     for reading, feet in zip(readings, stood_on, strict=True):
         # the largest force of another plate with a foot on it; 0 with a foot on this one, or without
         others = (one for one, on in zip(readings, stood_on, strict=True) if on and not feet)
         loads = (float(np.abs(one.sensor[:, 2]).max()) for one in others)
-        elsewhere = max((load for load in loads if load > _SOMEBODY), default=0.0)
+        elsewhere = max((load for load in loads if load > 5 * TOUCH_FORCE), default=0.0)
         # Its zero first: a plate that reads a small constant is no dead one.
         constant = _without_offset(reading, elsewhere)
         if why := _why_dead(constant, markers, elsewhere):
@@ -135,21 +113,11 @@ def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> t
     return alive, dead
 
 
-def _feet_on(reading: PlateReading, markers: Markers) -> bool:
-    """Return whether a marker as low as a standing foot's is ever over the plate, or no more than 0.05 m beside it."""
-    centre = reading.corners.mean(axis=0)
-    # Component along each axis of the plate.
-    x, y, _ = (reading.axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
-    low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= FOOT_HEIGHT
-    # 0.05 m by which a sole reaches beyond its markers
-    half = reading.half + 0.05
-    return bool((low & (np.abs(x) <= half[0]) & (np.abs(y) <= half[1])).any())
-
-
 def _without_offset(reading: PlateReading, elsewhere: float) -> PlateReading:
     """Return the reading without the constant that it reads while the person is ``elsewhere`` (N), as its zero."""
     level, spread, _ = _course(reading, _CONTACT)
-    if not TOUCH_FORCE < abs(level) <= LARGEST_SHARE * elsewhere or spread >= _QUIET:
+    # 2.5 N: half the spread up to which `decode` calls a plate quiet; a foot that comes or goes changes it far more.
+    if not TOUCH_FORCE < abs(level) <= LARGEST_SHARE * elsewhere or spread >= 2.5:
         return reading
     zero = reading.sensor[reading.known].mean(axis=0)
     said = f"Zero: no foot is ever on the plate, so the constant {level:.3g} N that it reads was subtracted."
@@ -161,9 +129,9 @@ def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) 
     """Return why a plate is dead, "" for one alive: a constant load at one place though the person moves."""
     length = _CONTACT if elsewhere else 0.0  # noise is averaged only where feet tell that nobody is on the plate
     level, spread, wanders = _course(reading, length)
-    # Shares of the level: noise of a load grows with it, and moments over it are places.
-    # 0.001 m: standard deviation of a centre of pressure that nobody moves
-    still = spread < _STUCK * abs(level) and wanders < 0.001 * abs(level)
+    # Shares of the level: noise of a load grows with it, and moments over it are places. Whoever moves on a plate
+    # varies its vertical force by 2e-3 at least, and moves the centre of pressure by more than 0.001 m (sd).
+    still = spread < 2e-3 * abs(level) and wanders < 0.001 * abs(level)
     if markers is None or abs(level) <= TOUCH_FORCE or not still:
         return ""
     if not (elsewhere or movement(markers) > StandingRules.still):
@@ -217,7 +185,9 @@ def without_padding(
 def _repeats(live: Array) -> int:
     """Return how many samples before the first measured one repeat it; 0 for too few."""
     count = int(np.argmax((live != live[0]).any(axis=1))) - 1
-    return count if count + 1 >= _FEWEST and live[0].any() else 0
+    # Five equal samples are no chance: where each of six channels repeats its number half of the time, as a coarse
+    # converter does at rest, all of them repeat it four times in six of a hundred million rows.
+    return count if count >= 4 and live[0].any() else 0
 
 
 def _moves(markers: Markers | None, start: float, stop: float) -> bool:
@@ -323,16 +293,10 @@ def _placed(plate: Plate, corners: Array) -> Plate:
     if not plate.placed:
         return replace(plate, corners=corners, placed=True)
     turn = plate_axes(corners) @ plate_axes(plate.corners).T
-    local = wrench_about_point(plate.wrench.value, plate.centre)
     # Both vectors turn about the plate's own centre.
-    turned = np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T])
-    wrench = Wrench(plate.wrench.time, wrench_about_origin(turned, corners.mean(axis=0)))
+    local = turned_wrench(wrench_about_point(plate.wrench.value, plate.centre), turn)
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(local, corners.mean(axis=0)))
     return replace(plate, corners=corners, wrench=wrench, zero=turn @ plate.zero)
-
-
-_MOVED = 0.05
-"""m between two trials from which on the plate was another one, or moved: nearly three times what the feet
-leave open in two (0.013 m each)."""
 
 
 def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
@@ -344,7 +308,8 @@ def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     place, notes = {}, list[str]()
     for name, found in puts.items():
         apart = float(np.ptp(found, axis=0).max())
-        if apart > _MOVED:
+        # Nearly three times what the feet leave open in two trials (0.013 m each): another plate, or it was moved.
+        if apart > 0.05:
             notes.append(
                 Doubt(
                     f"{name} would lie up to {1000 * apart:.0f} mm elsewhere in another trial by where the feet stand: "

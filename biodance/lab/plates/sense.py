@@ -12,7 +12,7 @@ from biodance.lab.plates import PLATE_TYPES
 from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading
 from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
-from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
+from biodance.spatial import turned_wrench, wrench_about_origin, wrench_about_point, zero_moment_point
 
 _Said = tuple[str, ...]
 
@@ -23,21 +23,10 @@ _MOMENT_UNITS = (1.0, 1000.0, 0.001)
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 """A vector of the plate turned by 180 degrees about z: some programs write ORIGIN x, y from the surface to the sensor.
 """
-_QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0), (0, -1))]
-"""Rotations about z by 90, 180 and 270 degrees."""
-
 _THROUGHOUT = 0.8
 """Share of the loads that lie under the feet where the axes are right, edges of steps left aside."""
 _UNDER_THE_FOOT, _NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
-_HANGING = 0.09
-"""m over the plate: of a foot that stands there is a lower marker, at the ankle if at nothing else; who sits on the
-plate lets them hang higher.
-"""
-
 _SWAY_BAND = (0.5, 5.0)  # Hz
-_SWAY_CORRELATION = 0.4
-_SWAY_SLOPE = (0.25, 3.0)
-"""1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass."""
 _FZ_ALONE = (
     "Fz alone was turned round: its sign is another one than on the other plates, and with the other channels as they "
     "are the load lies under the feet that the markers show."
@@ -206,7 +195,7 @@ def sway_sign(force: Array, point: Array, rate: float) -> int:
         return 0
     seconds = len(force[part]) / rate
     # Least correlation that is no chance: the band holds 2 B T independent samples.
-    least, signs = max(_SWAY_CORRELATION, 3 / np.sqrt(2 * (_SWAY_BAND[1] - _SWAY_BAND[0]) * seconds)), []
+    least, signs = max(0.4, 3 / np.sqrt(2 * (_SWAY_BAND[1] - _SWAY_BAND[0]) * seconds)), []
     for axis in (0, 1):
         shear, cop = _band(force[part, axis], rate), _band(point[part, axis], rate)
         power = float(cop @ cop)
@@ -216,7 +205,7 @@ def sway_sign(force: Array, point: Array, rate: float) -> int:
         correlation = float(shear @ cop / np.sqrt(power * float(shear @ shear)))
         # Regression of the shear on the pressure, per weight: about 1 / h.
         slope = abs(float(shear @ cop)) / power / abs(float(force[part, 2].mean()))
-        if abs(correlation) < least or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
+        if abs(correlation) < least or not 0.25 <= slope <= 3.0:
             return 0
         # The shear on the person is opposite to the pressure: a negative correlation is the reaction.
         signs.append(-np.sign(correlation))
@@ -255,10 +244,9 @@ def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array
     ``F = s R f``, ``M = s det(R) R m + c x F`` for ``axes`` R (3, 3) lab_R_plate and ``sign`` s; mirrored axes
     (determinant -1) turn moments, which are axial vectors, the other way round than forces.
     """
-    force = sign * wrench[:, :3] @ axes.T
     # An axial vector under a mirror: det R = -1 turns it once more.
-    moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
-    return wrench_about_origin(np.hstack([force, moment]), centre)
+    signs = sign * np.repeat([1.0, np.linalg.det(axes)], 3)
+    return wrench_about_origin(turned_wrench(wrench * signs, axes), centre)
 
 
 def left_out_said(number: int, why: TrialRefused | str) -> str:
@@ -421,7 +409,8 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
         near = f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show."
         return reading, 0, near, ""
     # Other corner as the first: the axes turned by quarters about z.
-    turns = {90 * k: replace(reading, axes=reading.axes @ turn) for k, turn in enumerate(_QUARTER_TURNS, start=1)}
+    quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    turns = {90 * k: replace(reading, axes=reading.axes @ np.linalg.matrix_power(quarter, k)) for k in range(1, 4)}
     found = {angle: _distance(turned, time, markers, throughout=True) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= _UNDER_THE_FOOT]
     if len(good) == 1 and all(d is None or d > _NOT_UNDER for angle, d in found.items() if angle != good[0]):
@@ -450,13 +439,13 @@ def _distance(reading: PlateReading, time: Array, markers: Markers, *, throughou
     low = np.abs(xyz[:, :, 2] - centre[2]) <= FOOT_HEIGHT
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
     if throughout:
-        # Rows are vectors: v @ axes is axes'v, in the plate's axes.
-        # 0.05 m beyond the edge: markers of a foot that stands on the plate
-        near &= (np.abs(((xyz - centre) @ reading.axes)[..., :2]) <= reading.half + 0.05).all(axis=2)
+        near &= reading.under(xyz)
     seen = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
     if seen.sum() < max(1, min(5, len(cop))):
         return None
-    if np.median(np.nanmin(np.where(near, xyz[:, :, 2], np.nan)[seen], axis=1)) - centre[2] > _HANGING:
+    # Of a foot that stands there is a marker below 0.09 m, at the ankle if at nothing else; who sits on the plate
+    # lets them hang higher.
+    if np.median(np.nanmin(np.where(near, xyz[:, :, 2], np.nan)[seen], axis=1)) - centre[2] > 0.09:
         return None
     point, near, feet = cop[seen], near[seen], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[seen]
     # the markers near the plate first, so that no more columns are left than feet were ever seen there

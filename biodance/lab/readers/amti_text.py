@@ -190,7 +190,6 @@ def _example(values: Array, found: dict[str, Any]) -> str:
 
 PLATE_UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """lab_R_plate (3, 3): AMTI's plate axes have z down; x stays, y and z are turned, so that the lab's z points up."""
-_OWN_ZERO = 5.0  # N: an unloaded reading up to here is what the maker's own zero leaves and is kept
 
 
 def amti_plate(
@@ -230,7 +229,7 @@ def _zeroed(channels: Array, rate: float) -> tuple[Array, str]:
         return channels, "Zero: the maker's own was kept; the plate is never seen unloaded."
     empty = channels[zero.start : zero.stop].mean(axis=0)
     where = f"unloaded (samples {zero.start + 1}-{zero.stop}) the plate reads {empty[2]:.2g} N vertical"
-    if abs(empty[2]) <= _OWN_ZERO:
+    if abs(empty[2]) <= 5.0:  # what the maker's own zero leaves
         return channels, f"Zero: the maker's own was kept; {where}."
     return channels - empty, f"Zero: {where}; that mean was subtracted from every channel."
 

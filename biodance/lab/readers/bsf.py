@@ -18,12 +18,11 @@ from biodance.settings import STANDARD_GRAVITY
 NAME = "AMTI NetForce"
 EXTENSIONS = (".bsf",)
 PREFERENCE = 30
-_VERSIONS = (100, 105)
 
 
 def sniff(head: bytes) -> bool:
     """Return whether the head begins with a version of NetForce."""
-    return len(head) >= 8 and struct.unpack("<i", head[:4])[0] in _VERSIONS
+    return len(head) >= 8 and struct.unpack("<i", head[:4])[0] in _SAMPLE
 
 
 def _layout(text: str) -> Any:
@@ -47,7 +46,7 @@ INSTRUMENT = _layout(
 )
 _SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
 _IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
-_MOST_PLATES, _MOST_CHANNELS, _FASTEST = 16, 32, 100_000
+_MOST_PLATES = 16
 
 
 def _load(block: NDArray[Any], header: Any, version: int, where: str) -> Array:
@@ -81,7 +80,7 @@ def _main_header(content: bytes, path: Path) -> Any:
     legal = {
         "number of plates": (int(main["plates"]), 1, _MOST_PLATES),
         "number of other instruments": (int(main["instruments"]), 0, _MOST_PLATES),
-        "rate": (int(main["rate"]), 1, _FASTEST),
+        "rate": (int(main["rate"]), 1, 100_000),
         "header size": (int(main["size"]), MAIN.itemsize - 4, 100 * MAIN.itemsize),
     }
     for what, (value, low, high) in legal.items():
@@ -107,7 +106,7 @@ def _instruments(content: bytes, main: Any, path: Path) -> tuple[list[Any], int]
         header = np.frombuffer(content, INSTRUMENT, 1, offset=at)[0]
         if (
             not INSTRUMENT.itemsize <= int(header["size"]) <= 10 * INSTRUMENT.itemsize
-            or not 1 <= int(header["channels"]) <= _MOST_CHANNELS
+            or not 1 <= int(header["channels"]) <= 32
         ):
             raise FileRefused(
                 f"{path}: the header of instrument {number + 1} says {int(header['size'])} bytes and "
@@ -132,9 +131,6 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
         at = int(np.argwhere(wrong)[0][0]) + 1
         raise FileRefused(f"{path}: sample {at} is not a number that a plate records. Export it again.")
     return data
-
-
-_LIGHTEST, _HEAVIEST = 10.0, 300.0  # kg
 
 
 def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
@@ -187,7 +183,7 @@ def read(path: str | Path, *, role: Role = "fit", subject: str | None = None) ->
         mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
     elif height > 3:
         height /= 100
-    measures = {"Bodymass": mass} if _LIGHTEST <= mass <= _HEAVIEST else {}
+    measures = {"Bodymass": mass} if 10 <= mass <= 300 else {}
     measures |= {"Height": height} if 0.5 <= height <= 2.5 else {}
     return Trial(path.stem, role, None, tuple(plates), source, "", measures, tuple(history), tuple(warnings))
 

@@ -16,21 +16,18 @@ from biodance.lab.program_tables import Y_UP_TO_Z_UP, TimeTable, read_mot
 from biodance.lab.readers import head_text
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import COP_FORCE
-from biodance.spatial import wrench_about_origin
+from biodance.spatial import turned_wrench, wrench_about_origin
 
 _NOT_PLACED = (
     "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to "
     "spare."
 )
-_FARTHEST = 50.0  # m
 _AXES = "xyz"
 _TURNED_BY = 0.1
 """m: moment along the force, as a share of the force, that no ground gives: friction of the whole force (coefficient
 0.8, a shoe on rubber) half a foot from the middle. Over 126 plates of 12 laboratories it is 0.0001 (quiet standing) to
 0.026 m (RMS; 0.09 at most where a plate is wrong), so 0.1 to 26 where torques are N·mm.
 """
-_READS = 0.3
-"""N: an empty row that reads less is zero: writers of tables cut off what is below a threshold."""
 
 NAME = "table of OpenSim"
 EXTENSIONS = (".mot", ".sto")
@@ -101,7 +98,7 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     history = [*table.history, *([axis.said] if axis.said else []), *decided]
     plates = []
     for number, (name, value) in enumerate(raw.items(), start=1):
-        wrench = Wrench(axis.time, sign * np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T]))
+        wrench = Wrench(axis.time, sign * turned_wrench(value, turn))
         one = rows[name]
         loaded = np.linalg.norm(one.force, axis=1) >= COP_FORCE
         height = float(np.median((one.point[loaded] @ turn.T)[:, 2])) if loaded.any() else 0.0  # of the pressures
@@ -168,7 +165,7 @@ def _rows(table: TimeTable, columns: dict[str, str], where: str) -> _Rows:
         )
     point = np.where(loaded[:, None], point, 0.0)
     under_load = np.linalg.norm(force, axis=1) >= COP_FORCE
-    if under_load.any() and (far := float(np.median(np.abs(point[under_load]).max(axis=1)))) > _FARTHEST:
+    if under_load.any() and (far := float(np.median(np.abs(point[under_load]).max(axis=1)))) > 50.0:
         raise FileRefused(
             f"{where}: the point of application lies {far:.0f} m from the origin; it must be in metres. Export it in "
             f"metres."
@@ -200,7 +197,8 @@ def _zeroed(rows: _Rows, time: Array, turn: Array) -> _Rows:
         return rows
     window = find_baseline(rows.force @ turn[2], zero=None, rate=1 / float(np.median(np.diff(time))))
     empty = slice(window.start, window.stop)
-    if window.stop <= window.start or np.abs(reads := rows.force[empty].mean(axis=0)).max() < _READS:
+    # Less than 0.3 N is zero: writers of tables cut off what is below a threshold.
+    if window.stop <= window.start or np.abs(reads := rows.force[empty].mean(axis=0)).max() < 0.3:
         return rows
     torque = np.median(rows.torque[empty], axis=0)
     # A torque that noise alone would give is no zero.

@@ -23,7 +23,16 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import MarkerSet, landmark, read_marker_set, recognise
 from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled, time_axis
-from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
+from biodance.lab.markers.upright import (
+    METRES,
+    as_high_as_ever,
+    axis_to_head,
+    body_is_tall_along_z,
+    extents,
+    likely_unit,
+    on_the_ground,
+    turn_to,
+)
 from biodance.lab.plain_text import Cells, clean_label, header_of, is_parquet, read_bytes, read_cells, sha256
 from biodance.lab.plates import C3D_ONLY, FORCE, MOMENT, NOTHING_TOLD, Told, channel_groups, plain_unit
 from biodance.lab.plates.decode import around_pressures, find_baseline, plate_axes
@@ -31,7 +40,7 @@ from biodance.lab.plates.read import PlatesRead
 from biodance.lab.readers import head_text
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Role, Source, Trial, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
-from biodance.spatial import wrench_about_origin
+from biodance.spatial import turned_wrench, wrench_about_origin
 
 _TIME = re.compile(
     r"(?:time|t|time[\s_]?stamps?|stamps?|elapsed(?:[\s_]?time)?|seconds?|secs?)"
@@ -124,8 +133,6 @@ class Load(NamedTuple):
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
-_IN_SECONDS = 1.5
-"""Steps of a time column up to which it is in s (in ms, µs beyond): from 0.7 Hz on, so from 667 Hz down in ms."""
 
 
 def read(path: Path, *, role: Role, subject: str | None = None, told: Told | None = None) -> Trial:
@@ -199,8 +206,8 @@ def _stamps(cells: Cells, columns: TableColumns, path: Path) -> tuple[Array, lis
     if unit not in _SECONDS:
         step = float(np.median(np.diff(raw))) if raw.size > 1 else 0.0
         whole = step >= 1 and bool((raw == np.rint(raw)).all())
-        # Up to 1.5 a step is in s, up to 1500 in ms, and so on.
-        factors = [_IN_SECONDS * 1000**k for k in range(3)]
+        # Up to 1.5 a step is in s, from 0.7 Hz on; up to 1500 in ms, so from 667 Hz down; and so on.
+        factors = [1.5 * 1000**k for k in range(3)]
         unit = "ms" if whole and step < factors[0] else list(_SECONDS)[int(np.searchsorted(factors, step))]
         by = f"steps of {step:.4g}"
     label = cells.labels[columns.time]
@@ -259,19 +266,12 @@ def _time_said(axis: TimeAxis, markers: Markers, loads: list[Load]) -> list[str]
 
 
 _PERSON = (50.0, 4000.0)  # N that the mean load on plates can be: a child of 5 kg to 400 kg
-_FARTHEST = 20.0
-"""m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
 _SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
 _UNDER = 0.25  # m between pressure and feet up to which they belong together: a foot's length
-_FLAT = 0.03
-"""m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
-_SINKS = 0.02
-"""m by which the mean marker may be lower than when the person stands as high as ever: who squats or bends leans."""
 _PRESSED = 0.58
 """Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
 laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
 """
-_PLACE_SD = 0.013  # m along the feet, the same 12 people: what their way of leaning leaves open
 
 
 def loads_of(
@@ -292,7 +292,8 @@ def loads_of(
     if force not in FORCE:
         force = next((unit for unit in ("n", "kn") if _PERSON[0] <= size * FORCE[unit] <= _PERSON[1]), "n")
     if moment not in MOMENT:
-        moment = "nmm" if _arm(groups, values) > _FARTHEST * FORCE[force] else "nm"
+        # No pressure lies 20 m from the point of the moments.
+        moment = "nmm" if _arm(groups, values) > 20.0 * FORCE[force] else "nm"
     factors = [FORCE[force]] * 3 + [MOMENT[moment]] * 3
     loads = [Load(f"{labels[group[0]]} ... {labels[group[-1]]}", values[:, list(group)] * factors) for group in groups]
     weight = size * FORCE[force]
@@ -329,7 +330,7 @@ def table_plates(
     for n, load, one in used:
         if one.corners is not None:
             # along the plate's own axes, about its centre
-            turned, zero, zeroed = _zeroed(_turned(load.value, plate_axes(one.corners)), time)
+            turned, zero, zeroed = _zeroed(turned_wrench(load.value, plate_axes(one.corners)), time)
             signed, sign = _upright(turned)
             wrench = Wrench(time, wrench_about_origin(signed, one.corners.mean(axis=0)))
             about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
@@ -375,11 +376,6 @@ def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
     return value - reads, reads[:3], said
 
 
-def _turned(value: Array, turn: Array) -> Array:
-    """Return forces and moments (T, 6) along the axes that ``turn`` (3, 3) leads to."""
-    return np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T])
-
-
 @dataclass(frozen=True, eq=False)
 class _Feet:
     """Where the feet are: ``middle`` (F, 2) m where those on the ground are pressed at ``time`` (F,), NaN while none
@@ -399,19 +395,16 @@ def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     if any(end is None for foot in ends for end in foot):
         return None
     places = np.array(ends, dtype=float)  # (side, end, T, 3)
-    # Fifth percentile: single frames below the ground do not count.
-    lowest = np.nanpercentile(places[..., 2], 5, axis=2, keepdims=True)
-    down = (places[..., 2] < lowest + _FLAT).all(axis=1)  # (side, T)
+    down = np.asarray(on_the_ground(places[..., 2]).all(axis=1))  # (side, T)
+    both = np.asarray(down.all(axis=0))
     # Between heel and toe, at the share where people press.
     pressed = (1 - _PRESSED) * places[:, 0, :, :2] + _PRESSED * places[:, 1, :, :2]
     foot = np.where(down[..., None], pressed, np.nan)
     # Both down: between them; one down: under it.
-    middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
-    # As high as ever: the mean of all markers while both feet are down.
-    both = down.all(axis=0)
+    middle = np.where(both[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
+    # The mean of all markers while both feet are down.
     height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
-    upright = height > np.nanpercentile(height[both], 95) - _SINKS if both.any() else both
-    return _Feet(markers.time, middle, both & upright)
+    return _Feet(markers.time, middle, as_high_as_ever(height, both))
 
 
 def _pressure(value: Array) -> Array:
@@ -425,7 +418,7 @@ def _pressure(value: Array) -> Array:
 
 def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> PlatesRead:
     """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
-    zeroed = [_zeroed(_turned(load.value, turn), time) for _, load in free]
+    zeroed = [_zeroed(turned_wrench(load.value, turn), time) for _, load in free]
     signed = [_upright(value) for value, _, _ in zeroed]
     total = np.sum([value for value, _ in signed], axis=0)
     # The place is told by the total: which foot is on which plate does not matter.
@@ -433,7 +426,9 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
         return PlatesRead(warnings=(_lacking([n for n, _ in free], feet, shift),))
     own = float(np.linalg.norm(shift)) > _UNDER
-    at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
+    at = np.array([*shift, 0.0]) if own else np.zeros(3)
+    usual = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
+    about = _put(shift) if own else usual
     plates, history = [], []
     for (number, load), (value, said), (_, zero, empty) in zip(free, signed, zeroed, strict=True):
         wrench = Wrench(time, wrench_about_origin(value, at))
@@ -449,16 +444,13 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     return PlatesRead(tuple(plates), history=tuple(history))
 
 
-_ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
-
-
 def _put(shift: Array) -> str:
     """Say where a plate was put by the feet, at ``shift`` (2,) m."""
     return (
         f"Place: the table does not say it. The moments are not about the lab's origin (the pressure would lie "
         f"{np.linalg.norm(shift):.2f} m beside the feet), so they are about the plate's own point, which was put at "
         f"({shift[0]:.3f}, {shift[1]:.3f}, 0) m, where the pressure lies under the feet as people stand: known "
-        f"to {1000 * _PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
+        f"to 13 mm. Give corners_m in [plates.plate1] of session.toml to know it better."
     )
 
 

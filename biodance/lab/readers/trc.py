@@ -37,11 +37,7 @@ _TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
 PREFERENCE = 10
-_FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
 _TABLES = (".mot", ".sto")
-
-_MARKER_FOLDER = re.compile(r"marker|mocap|trc", flags=re.IGNORECASE)
-_FORCE_FOLDER = re.compile(r"force|grf|^id$|kinetic|^mot$|inverse.?dynamics", flags=re.IGNORECASE)
 
 
 def sniff(head: bytes) -> bool:
@@ -62,11 +58,11 @@ def beside(path: Path) -> Path | None:
 
     It has the stem of the markers with a usual ending, else it is the only one whose stem goes on behind theirs.
     """
-    folder = path.parent
-    beside_it = sorted(folder.parent.iterdir()) if _MARKER_FOLDER.search(folder.name) else []
-    places = (folder, *(one for one in beside_it if one.is_dir() and _FORCE_FOLDER.search(one.name)))
+    folder, of_forces = path.parent, r"(?i)force|grf|^id$|kinetic|^mot$|inverse.?dynamics"
+    beside_it = sorted(folder.parent.iterdir()) if re.search(r"(?i)marker|mocap|trc", folder.name) else []
+    places = (folder, *(one for one in beside_it if one.is_dir() and re.search(of_forces, one.name)))
     for place in places:
-        for ending, suffix in product(_FORCES_BESIDE, _TABLES):
+        for ending, suffix in product(("", "_grf", "_GRF", "_forces", "_ground_forces"), _TABLES):
             candidate = place / f"{path.stem}{ending}{suffix}"
             if candidate.is_file() and _may_hold_forces(candidate):
                 return candidate

@@ -172,8 +172,6 @@ _PART_FOLDERS = re.compile(
     flags=re.IGNORECASE,
 )
 """Names of folders that are parts of a session, not sessions."""
-_IN_NAME = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])(?!\d)")
-"""Year, month and day in the name of a folder."""
 
 
 def archive_folders(archive: str | Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
@@ -234,8 +232,9 @@ def visit_date(folder: Path) -> str:
         said = None
     if said is not None:
         return iso_date(said)
+    year_month_day = r"(?<!\d)((?:19|20)\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])(?!\d)"
     for name in (folder.resolve().name, folder.resolve().parent.name):
-        if found := _IN_NAME.search(name):
+        if found := re.search(year_month_day, name):
             return "-".join(found.groups())
     return ""
 

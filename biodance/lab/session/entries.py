@@ -23,7 +23,6 @@ from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Plate, 
 
 _KINDS = {"strike": True, "off": False}
 _KEYS = ("side", "kind", "time")
-_EXAMPLE = '{side = "left", kind = "strike", time = 1.23}'
 
 
 def legal_events(given: Sequence[Mapping[str, float | str]] | None) -> tuple[FootEvent, ...]:
@@ -55,7 +54,7 @@ def _event(given: Mapping[str, float | str]) -> FootEvent:
     if side not in SIDES or kind not in _KINDS or not isinstance(time, int | float) or not isfinite(time):
         raise SessionRefused(
             f"events has {dict(given)!r}, which is not legal. Write a side (left, right), a kind (strike, off) and the "
-            f"time in s: {_EXAMPLE}."
+            f'time in s: {{side = "left", kind = "strike", time = 1.23}}.'
         )
     return FootEvent(float(time), str(side), _KINDS[str(kind)], "hand")
 
@@ -249,9 +248,6 @@ def refuse_worn(prosthesis: str | None, devices: Mapping[str, float]) -> None:
             )
 
 
-_ORDER = "in the order +x+y, -x+y, -x-y, +x-y of the plate's own axes"
-
-
 class PlateEntry(BaseModel):
     """One table ``[plates.NAME]``; None = not said. `told_plate` checks the numbers."""
 
@@ -305,7 +301,8 @@ def _numbers(value: Any, where: str, legal: str) -> Array:
 
 
 def _corners(value: Any, where: str) -> Array:
-    legal = f"four points [x, y, z] in m in the lab frame (z up), {_ORDER}"
+    order = "in the order +x+y, -x+y, -x-y, +x-y of the plate's own axes"
+    legal = f"four points [x, y, z] in m in the lab frame (z up), {order}"
     corners = _numbers(value, f"{where} corners_m", legal)
     if corners.shape != (4, 3):
         raise SessionRefused(f"{where} corners_m has the shape {corners.shape}. Write {legal}.")

@@ -39,8 +39,6 @@ from biodance.records.attention import Doubt
 from biodance.settings import USUAL, Settings
 
 _ALIASES = {"calf": "shank"}  # What else a girth is called
-_LEGAL = (0.4, 2.2)  # Of the usual girth: smaller or larger ones are another unit or a slip of the pen
-_MIDDLE = ("hip", "waist", "chest", "neck", "head")
 
 
 @functools.cache
@@ -64,7 +62,7 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
         side = next((f"{side}_" for side in SIDES if said.startswith(f"{side}_")), "")
         short = said.removeprefix(side)
         name = _ALIASES.get(short, short)
-        if name not in usual_girths() or (side and name in _MIDDLE):
+        if name not in usual_girths() or (side and name in ("hip", "waist", "chest", "neck", "head")):
             legal = (*usual_girths(), *_ALIASES)
             raise SessionRefused(
                 f"girths_cm: there is no girth {said!r}.{did_you_mean(said, legal)} Legal: {', '.join(legal)}; "
@@ -73,8 +71,8 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
         if f"{side}{name}" in found:
             raise SessionRefused(f"girths_cm: {side}{name} is given twice (also as {said!r}). Keep one of the two.")
         usual = usual_girths()[name]
-        low, high = (share * usual for share in _LEGAL)
-        if not low <= value <= high:
+        low, high = 0.4 * usual, 2.2 * usual
+        if not low <= value <= high:  # another unit, or a slip of the pen
             units = {"mm": value / 10, "m": value * 100, "inch": value * 2.54}
             unit = next((unit for unit, one in units.items() if 0.6 * usual <= one <= 1.6 * usual), "")
             hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again, in cm."

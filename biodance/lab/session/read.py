@@ -246,10 +246,6 @@ def _nothing_left(folder: Path, files: Sequence[Path], refused: Mapping[str, str
     return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."
 
 
-_SHARED = 6
-"""Labels of the session's set that a trial must have to be read with it: three markers on each of two segments."""
-
-
 def dress(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials, all with one marker set where their labels allow it, and what was found in sentences.
 
@@ -285,6 +281,7 @@ def _with(trial: Trial, found: MarkerSet) -> Trial:
         return trial
     matched = found.match(trial.markers.names)
     own = len(read_marker_set(trial.marker_set).match(trial.markers.names)) if trial.marker_set else 0
-    if len(matched) < _SHARED or len(matched) < own:
+    # Six labels: three markers on each of two segments.
+    if len(matched) < max(6, own):
         return trial
     return replace(trial, marker_set=found.name)

@@ -27,7 +27,6 @@ from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.records import Role, Trial, grouped
 from biodance.records.attention import Doubt
 
-_MASSES = ("bodymass",)
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
 _NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
 _SIDE = re.compile(r"^(Left|Right)(?=[A-Z])")
@@ -144,12 +143,8 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
         short = _SIDE.sub(lambda side: side[1][0], name)
         if value == 0 or ANGLES.search(short) or _NOT_MEASURES.search(short):
             continue
-        measures[short] = value if short.lower() in _MASSES else value * 1e-3
+        measures[short] = value if short.lower() == "bodymass" else value * 1e-3
     return measures
-
-
-_STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
-_VALIDATE_WORDS = ("squat", "squats")
 
 
 def role_by_name(name: str) -> Role | None:
@@ -160,11 +155,9 @@ def role_by_name(name: str) -> Role | None:
     calibration.
     """
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
-    if any(word in _STATIC_WORDS or word.startswith("static") for word in words):
+    if {"cal", "calib", "calibration", "tpose", "npose"} & {*words} or any(word.startswith("static") for word in words):
         return "static"
-    if any(word in _VALIDATE_WORDS for word in words):
-        return "validate"
-    return None
+    return "validate" if {"squat", "squats"} & {*words} else None
 
 
 TEXT = (".txt", ".csv", ".tsv")
@@ -345,10 +338,6 @@ def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Tr
     return [trial for trial in trials if trial.source.path.name not in strangers], strangers
 
 
-_SAME_START, _SAME_LENGTH = 0.1, 0.02
-"""s, share: what markers and forces of one recording, exported by two programs, may differ by."""
-
-
 def forces_apart(trials: Sequence[Trial]) -> list[str]:
     """Return a sentence for every table of forces without markers that covers the time of one .trc file without forces:
     what to call it, so that the two are read together.
@@ -358,8 +347,9 @@ def forces_apart(trials: Sequence[Trial]) -> list[str]:
     for forces in (one for one in trials if one.source.format == "MOT" and one.plates):
         span = forces.plates[0].wrench.time[[0, -1]]
         times = [(one, one.markers.time[[0, -1]]) for one in alone if one.markers is not None]
-        near = [one for one in times if abs(one[1][0] - span[0]) < _SAME_START]
-        fits = [one for one, time in near if abs(np.ptp(time) - np.ptp(span)) < _SAME_LENGTH * np.ptp(span) + 0.02]
+        # Markers and forces of one recording, exported by two programs, may begin 0.1 s apart and differ by 2 %.
+        near = [one for one in times if abs(one[1][0] - span[0]) < 0.1]
+        fits = [one for one, time in near if abs(np.ptp(time) - np.ptp(span)) < 0.02 * np.ptp(span) + 0.02]
         if len(fits) == 1:
             file, name = forces.source.path, f"{fits[0].source.path.stem}_grf{forces.source.path.suffix}"
             said.append(

@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.display import spaced
 from biodance.lab.markers.sets import landmark, read_marker_set
-from biodance.lab.markers.upright import standing_mass
+from biodance.lab.markers.upright import as_high_as_ever, on_the_ground, standing_mass
 from biodance.lab.session.file import SubjectEntry
 from biodance.records import SIDES, Array, Markers, Subject, Trial
 from biodance.settings import CheckLimits
@@ -29,19 +29,8 @@ standard deviation of that share as a part of it, the surest first.
 Measured on 25 people of 1.33 to 1.86 m in 8 laboratories, whose differences count (random effects; DerSimonian and
 Laird 1986, doi:10.1016/0197-2456(86)90046-2): knees on 22, iliac spines 25, acromia 11, notch and C7 12, head 10.
 """
-_WALKING, _WALKING_SD = 0.018, 0.013
-"""Share of the stature by which somebody who moves is lower at the highest, and its standard deviation: the tallest
-trial of 12 people of 9 laboratories (walks, squats, marching) against their static trial, -3.9 to -0.1 %.
-"""
-_DOWN, _SINKS = 0.03, 0.02
-"""m of an ankle over its lowest place (5th percentile), and of the iliac spines under their highest (95th), up to which
-both feet are on the ground and the person is upright."""
 _ALIKE = 0.4
 """Correlation of the shares of two landmarks, the mean over the pairs: long legs lift all of them."""
-_RISE = 0.026
-"""Share of the stature by which acromion markers rise with arms lifted by 90 degrees (45 mm at 1.75 m), in proportion
-to the angle and known to half; measured on 7 people with arms out and 6 with arms down.
-"""
 
 
 def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
@@ -54,12 +43,13 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
     """
     at = _places(trial)
     ankles = _mean(at, tuple(f"{side}_ankle_lateral" for side in SIDES))
-    # the share of the stature by which lifted arms raise the acromion markers, known to half
+    # The share of the stature by which lifted arms raise the acromion markers, known to half: 2.6 % by arms lifted by
+    # 90 degrees (45 mm at 1.75 m), in proportion to the angle (7 people with arms out, 6 with arms down).
     ends = [(f"{side}_elbow_lateral", f"{side}_acromion") for side in SIDES]
     arms = [at[elbow] - at[shoulder] for elbow, shoulder in ends if elbow in at and shoulder in at]
     angles = [math.degrees(math.acos(float(-arm[2] / np.linalg.norm(arm)))) for arm in arms]
     # Arms without a marker at the elbow are taken to be lifted by 45 degrees.
-    rise = _RISE * (float(np.mean(angles)) if angles else 45.0) / 90.0
+    rise = 0.026 * (float(np.mean(angles)) if angles else 45.0) / 90.0
     told, spread, names = [], [], []
     for landmarks, (name, share, sd) in _SHARES.items():
         height = _mean(at, landmarks)[2] - ankles[2]
@@ -91,16 +81,16 @@ def stature_of_movement(trial: Trial) -> tuple[float, float, str]:
     heights = np.array([path[:, 2] for path in wanted if path is not None])
     if len(heights) < len(wanted) or np.isnan(heights).all(axis=1).any():
         return nothing
-    low, high = heights[:2], heights[2:].mean(axis=0)
-    upright = (low < np.nanpercentile(low, 5, axis=1, keepdims=True) + _DOWN).all(axis=0) & np.isfinite(high)
-    if upright.any():
-        upright &= high > np.percentile(high[upright], 95) - _SINKS
+    high = heights[2:].mean(axis=0)
+    upright = as_high_as_ever(high, np.asarray(on_the_ground(heights[:2]).all(axis=0)) & np.isfinite(high))
     # Ten such frames at least: on stairs both ankles are hardly ever low.
     if upright.sum() < 10:
         return nothing
     standing = Markers(markers.names, markers.time[upright], markers.xyz[upright])
     stature, sd, told_by = stature_of_markers(replace(trial, markers=standing))
-    return stature / (1 - _WALKING), math.hypot(sd, _WALKING_SD * stature), told_by
+    # Somebody who moves is lower by 1.8 % (sd 1.3) at the highest: the tallest trial of 12 people of 9 laboratories
+    # (walks, squats, marching) against their static trial, -3.9 to -0.1 %.
+    return stature / (1 - 0.018), math.hypot(sd, 0.013 * stature), told_by
 
 
 def _places(trial: Trial) -> Mapping[str, Array]:
@@ -122,11 +112,7 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
 _MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
 _STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
-_AGE_NAMES = ("age",)
-_SEX_NAMES = ("gender", "sex")
 _LEGAL_MASS, _LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
-_MIDDLE_INDEX = 22.5
-"""kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
 
 
 _Declared = tuple[float, str]
@@ -154,7 +140,7 @@ def identify_subject(
     masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
     mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
-    told = next((value for value, _ in _declared(sources, _SEX_NAMES, (0.0, 1.0)) if value in (0.0, 1.0)), None)
+    told = next((value for value, _ in _declared(sources, ("gender", "sex"), (0.0, 1.0)) if value in (0.0, 1.0)), None)
     declared: Literal["F", "M"] | None = None if told is None else "M" if told else "F"  # files hold it as 0 or 1
     sex = typed.sex or declared
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
@@ -162,7 +148,7 @@ def identify_subject(
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     mass = _middle_mass(mass, stature, trials, notes)
-    age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, _AGE_NAMES, (0.0, 120.0))], [])
+    age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, ("age",), (0.0, 120.0))], [])
     if math.isnan(age):
         notes.append(
             "The age is not given: adult tables and limits are used (below 1.50 m with twice their standard "
@@ -253,8 +239,8 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
             "The body mass was not declared, and nobody stands still on the plates. Set mass_kg in session.toml."
         )
         return mass
-    # Body mass index: mass over the square of the stature.
-    mass = round(_MIDDLE_INDEX * stature**2, 1)
+    # Body mass index, kg/m²: between the women (20.6) and the men (24.1) of de Leva 1996.
+    mass = round(22.5 * stature**2, 1)
     notes.append(
         f"The body mass is not known: not declared, and no plate was recorded. {mass:g} kg were taken, as people of "
         f"{stature:.2f} m weigh; the movement does not depend on it, forces and loads do. Set mass_kg in session.toml."
