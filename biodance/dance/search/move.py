@@ -267,11 +267,11 @@ def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move |
     return Move(via, duration, first.gram + second.gram, 0.0, "", stop[None])
 
 
-_SLOWER = (1.0, 1.4, 1.8)  # Factors on the duration of a straight move, one after the other
+_SLOWER = (1.0, 1.4, 1.8, 2.4)  # Factors on the duration of a straight move, one after the other
 ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _FROM_STOP = 0.08  # rad that a lifted leg keeps from the stops of its joints
-_LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
+_LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.65, -0.2, 0.0, 0.75, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
 """rad by which hip, knee and ankle of a lifted leg bend on the way, and by which it goes away from the other one."""
 _SAMPLED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Fractions of a move at which imprecise people must have room, too."""
