@@ -9,6 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from small_dances import BODY, small_dance
 
+from biodance.body.body import Body
+from biodance.body.human.human import human
+from biodance.body.human.skeleton import joint_limits
 from biodance.dance import design
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.limits import _vector
@@ -19,13 +22,15 @@ from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.problem.stance import holding, seat, stance
-from biodance.dance.search.course import Checkpoint, DesignContext
+from biodance.dance.problem.stance import Stance, holding, seat, stance
+from biodance.dance.search.course import Checkpoint, DanceStep, DesignContext
 from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
+from biodance.dance.search.move import ENOUGH, straight_move
 from biodance.dance.search.word_course import NoNextPosture, WordSearch
 from biodance.dance.verify import Margin, broken, verify
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import props
+from biodance.records import Subject
 from biodance.report.dance import mannequin_svg
 
 PLAN = Plan("x", "", (("parallel", 5),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.3, gentle=True)
@@ -54,6 +59,33 @@ def test_a_dance_asks_little_at_once_and_keeps_all_limits(searched) -> None:
     assert all((p in dance.mirrored) == (what == MIRROR_CALL) for p, what in enumerate(said))
     assert not broken(verify(BODY, dance, PLAN.limits))
     assert len({step.s for step in steps}) == len(steps)
+
+
+def at_rest(body: Body, plan: Plan, feet: Stance) -> PostureTable:
+    """Return the one posture on these feet in which nothing is asked of any part."""
+    words = words_for(body, plan, feet, read_vocabulary(), np.random.default_rng(0))
+    return PostureTable.of(Chain(body), feet, {part: group[:1] for part, group in words.items()})
+
+
+def test_imprecise_people_stand_on_either_leg_alike() -> None:
+    plan = replace(PLAN, blocks=(("single_right", 1), ("single_left", 1)), wide=1.35, gentle=False)
+    feet = [one for one in support_sequence(BODY, plan) if len(one.planted) == 1]
+    right, left = (at_rest(BODY, plan, one).keeps(0, plan.limits)[0] for one in feet)
+    assert 3.2 < right < 6
+    assert right == pytest.approx(left, rel=0.05)
+
+
+def test_even_small_people_lift_either_foot_within_15_mm_of_support() -> None:
+    plan, small = read_plan("easy"), Subject(45.0, 1.50, "F", 25.0)
+    body = replace(human(small), limits=joint_limits(small, within=plan.ranges))
+    search = WordSearch(DesignContext.alone(body, plan, 0))
+    lifts = [pair for pair in pairwise(support_sequence(body, plan)) if len(pair[0].planted) > len(pair[1].planted)]
+    assert [after.planted for _, after in lifts] == [(0,), (1,)]
+    for pair in lifts:
+        task = search.task(*(DanceStep(at_rest(body, plan, feet), 0) for feet in pair))
+        move, room = straight_move(task, pair)
+        assert not move.limit
+        assert room > ENOUGH
 
 
 def test_where_a_performer_has_too_little_room_another_posture_is_danced(searched, monkeypatch) -> None:

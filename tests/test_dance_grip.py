@@ -127,7 +127,7 @@ def test_every_known_posture_holds_the_frame_and_nobody_is_told_to_move_that_arm
 
 def test_a_hand_on_the_frame_errs_with_the_trunk_only() -> None:
     dance = Dance("t", BODY, held()[None], (FRAME,), np.ones(1), np.empty((0, 2, CHAIN.size)), np.empty(0), (), 0)
-    copies = PlannedDance(dance).held_by(20, np.zeros(1)).q[:, -len(BODY.joints) :]
+    copies = PlannedDance(dance).held_by(np.zeros(1)).q[:, -len(BODY.joints) :]
     right, left = (np.ptp(copies[:, [c - ROOT for c in arm]], axis=0) for arm in CHAIN.arm_columns)
     np.testing.assert_allclose(right, 0.0, atol=1e-12)
     assert (left > 0.1).all()

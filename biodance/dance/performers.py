@@ -156,14 +156,18 @@ class PlannedDance:
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)
 
-    def held_by(self, count: int, when: Array) -> ImpreciseCopy:
-        """Return what ``count`` people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the
-        plan, instant by instant.
+    def held_by(self, when: Array) -> ImpreciseCopy:
+        """Return what people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the plan: the
+        same `_DRAWN` at every one, instant by instant.
         """
-        how, rng, when = USUAL_IMPRECISION, np.random.default_rng(0), np.repeat(when, count)
-        error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
-        sway = how.sway * rng.normal(size=(when.size, 2))
-        return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
+        how, rng = USUAL_IMPRECISION, np.random.default_rng(0)
+        # Orthogonal columns and their negatives: mean and covariance are those of the population. Independent draws
+        # told the left side from the right one by chance (deviations of a mirrored posture: 3.4 and 4.4).
+        half = np.linalg.qr(rng.normal(size=(_DRAWN // 2, self.chain.size - 1)))[0] * np.sqrt(_DRAWN / 2)
+        drawn = np.tile(np.concatenate([half, -half]), (len(when), 1))
+        error, sway = how.tracking * drawn[:, :-2], how.sway * drawn[:, -2:]
+        places = np.repeat(when, _DRAWN)
+        return replace(self._copied(np.arange(places.size, dtype=float), places, error, sway, how), still=True)
 
     def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
         """Return the plan at ``when``, off by ``error`` rad (T, n - 3) and ``sway`` m (T, 2)."""
@@ -332,7 +336,7 @@ def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -
     when = when[~plan.stepping[plan.phase_at(when)]]
     if not when.size:
         return np.inf, ""
-    copy, found = plan.held_by(_DRAWN, when), [(np.inf, "")]
+    copy, found = plan.held_by(when), [(np.inf, "")]
     for limit, one in for_imprecise(limits).items():
         left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
         left = left[:, :, np.isfinite(left).all(axis=(0, 1))]

@@ -267,11 +267,16 @@ def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move |
     return Move(via, duration, first.gram + second.gram, 0.0, "", stop[None])
 
 
-_SLOWER = (1.0, 1.4, 1.8)  # Factors on the duration of a straight move, one after the other
+_SLOWER = (1.0, 1.4, 1.8, 2.4)  # Factors on the duration of a straight move, one after the other
 ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _FROM_STOP = 0.08  # rad that a lifted leg keeps from the stops of its joints
-_LIFTS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
+_LIFTS = (
+    (0.5, -0.1, 0.0, 0.55, 0.0, 0.0),
+    (0.5, -0.2, 0.0, 0.55, 0.0, 0.0),
+    (0.8, -0.2, 0.0, 0.9, 0.0, 0.0),
+    (0.8, -0.3, 0.0, 0.9, 0.0, 0.0),
+)
 """rad by which hip, knee and ankle of a lifted leg bend on the way, and by which it goes away from the other one."""
 _SAMPLED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Fractions of a move at which imprecise people must have room, too."""
@@ -309,15 +314,28 @@ def other_moves(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
 
 
 def _vias(task: Task) -> list[Array]:
-    """Return the via points (2, n) that are tried: straight on, on one leg also by lifts that are higher or wider."""
+    """Return the via points (2, n) that are tried: straight on, on one leg also by lifts that are higher or wider, each
+    with the pelvis as it is and as the weight asks for.
+    """
     limits, out = task.chain.body.limits, [task.straight()]
     for lift in _LIFTS if len(task.stance.planted) == 1 else ():
         (side,) = {0, 1} - set(task.stance.planted)
         columns, via = np.array(task.chain.leg_columns[side]), task.straight()
         low, high = limits.lower[columns - ROOT] + _FROM_STOP, limits.upper[columns - ROOT] - _FROM_STOP
         via[:, columns] = np.clip(via[:, columns] + lift, np.minimum(low, via[:, columns]), high)
-        out.append(via)
+        out += [via, _as_balanced(task, via, out[0])]
     return out
+
+
+def _as_balanced(task: Task, via: Array, straight: Array) -> Array:
+    """Return ``via`` (2, n) with the pelvis moved so that the centre of mass goes as on the ``straight`` way: a leg
+    that swings out carries it aside.
+    """
+    chain, planted, ankle = task.chain, task.stance.planted, task.stance.ankle
+    place, via = chain.mass_centre(chain.plant(straight, planted, ankle)), via.copy()
+    for _ in range(2):  # each leaves about a tenth of what is off
+        via[:, :2] += (place - chain.mass_centre(chain.plant(via, planted, ankle)))[:, :2]
+    return via
 
 
 def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
