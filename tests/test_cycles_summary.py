@@ -49,6 +49,14 @@ def test_cycles_that_scatter_widely_are_no_spikes() -> None:
     assert repetitions_of("gait", [trial("walk", curves)]).left_out == ()
 
 
+def test_a_trial_whose_cycles_are_all_unlike_the_others_holds_another_movement_and_no_spikes() -> None:
+    quick = [curve(cycle(k, trial="quick"), (60.0 + k) * SHAPE) for k in range(8)]
+    slow = [curve(cycle(k, trial="slow"), (110.0 + k) * SHAPE) for k in range(3)]
+    assert repetitions_of("gait", [trial("quick", quick), trial("slow", slow)]).left_out == ()
+    alone = repetitions_of("gait", [trial("quick", quick), trial("slow", slow[:1])])
+    assert [one.cycle for one in alone.left_out] == [slow[0].cycle]
+
+
 def test_a_turn_leaves_out_the_whole_cycle_also_over_the_seam() -> None:
     straight = curve(cycle(0), 5 * np.sin(np.linspace(0, 2 * np.pi, 101)), "pelvis_rotation")
     turning = curve(cycle(1), np.linspace(-3, 40, 101), "pelvis_rotation")

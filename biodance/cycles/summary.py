@@ -417,7 +417,9 @@ def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
 
 
 def _spikes(same: Sequence[CycleCurve]) -> list[CycleCurve]:
-    """Return the curves of one quantity and side that leave the others far behind."""
+    """Return the curves of one quantity and side that leave the others far behind; where most of a trial do, it holds
+    another movement (slow squats beside quick ones) and no spikes.
+    """
     if len(same) < _FEWEST or same[0].unit not in _LEAST or same[0].quantity.startswith("centre_of_mass"):
         return []
     values = np.stack([one.value for one in same])
@@ -425,4 +427,6 @@ def _spikes(same: Sequence[CycleCurve]) -> list[CycleCurve]:
     # Largest distance over the cycle to the median curve of all.
     apart = np.nan_to_num(np.abs(values[:, known] - np.nanmedian(values[:, known], axis=0))).max(axis=1, initial=0.0)
     far = max(_LEAST[same[0].unit], _FAR * float(np.median(apart)))
-    return [one for one, size in zip(same, apart, strict=True) if size > far]
+    sizes = grouped((one.cycle.trial, size) for one, size in zip(same, apart, strict=True))
+    other = {trial for trial, own in sizes.items() if len(own) > 1 and np.median(own) > far}
+    return [one for one, size in zip(same, apart, strict=True) if size > far and one.cycle.trial not in other]
