@@ -16,7 +16,8 @@ from biodance.lab.prepare import prepare
 from biodance.lab.program_tables import read_mot, write_mot
 from biodance.motion.track import track
 from biodance.pipeline.program_folders import opensim_coordinates, state_notes
-from biodance.records import AngleState, Markers, Motion, Trial
+from biodance.pipeline.session import examine
+from biodance.records import AngleState, LeftOut, Markers, Motion, Trial
 
 
 @pytest.fixture(scope="module")
@@ -104,3 +105,22 @@ def test_a_motion_without_any_determined_frame_has_no_coordinates(walker, whole:
     nothing = replace(whole, determined=np.zeros(len(whole.time), dtype=bool))
     with pytest.raises(TrialRefused, match="no frame's markers determine"):
         opensim_coordinates(walker[0], nothing)
+
+
+def test_forces_are_held_against_no_posture_that_only_fillings_fix(data: Path) -> None:
+    session = read_session(data / "biomechzoo" / "HC030A")
+    walk = session["HC030A05"]
+    assert walk.markers is not None
+    xyz = walk.markers.xyz.copy()
+    xyz[60:75, [walk.markers.names.index(name) for name in ("RKNE", "RTIB")]] = np.nan
+    gappy = replace(walk, markers=Markers(walk.markers.names, walk.markers.time, xyz))
+    found = examine(replace(session, trials=(session["HC030A01"], gappy)))["HC030A05"]
+    assert found.motion is not None
+    assert found.contact is not None
+    assert found.comparison is not None
+    filled = found.motion.frame_state == AngleState.FILLED
+    assert np.flatnonzero(filled).tolist() == list(range(60, 75))
+    assert found.contact.measured[filled].all(), "the plates measured them"
+    assert not found.comparison.used[filled].any()
+    assert found.comparison.used[~filled].sum() > 50
+    assert found.left_out[LeftOut.POSTURE_OPEN] == pytest.approx(0.15)

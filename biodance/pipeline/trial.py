@@ -36,6 +36,7 @@ from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.track import Followed, asked_cutoff, with_cutoff
 from biodance.records import CHANNEL_TITLES, Array, LeftOut, Mask, Motion, Sip, Trial, Wrench, runs
 from biodance.records.attention import seconds_left_out
+from biodance.records.motion import AngleState
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -380,8 +381,8 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         raise TrialRefused(
             f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared."
         )
-    # a posture that the markers leave open is a guess, and so are the accelerations made of it
-    chosen = contact.measured & motion.determined & ~at_an_end(trial, motion)
+    # a posture that the markers leave open, or only fillings of their gaps fix, is a guess, and so are accelerations
+    chosen = contact.measured & (motion.frame_state == AngleState.MEASURED) & ~at_an_end(trial, motion)
     if not chosen.any():
         raise TrialRefused(
             f"Trial {trial.name}: in no fully measured frame away from its ends do the markers fix the posture. "
@@ -457,7 +458,7 @@ def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, f
     if one.motion is None or one.motion.time.size < 2:
         return {}
     masks, fit = dict(contact.left_out), trial_fit(one)
-    masks[LeftOut.POSTURE_OPEN] = np.logical_not(one.motion.determined)
+    masks[LeftOut.POSTURE_OPEN] = one.motion.frame_state != AngleState.MEASURED
     masks[LeftOut.AT_AN_END] = at_an_end(one.trial, one.motion)
     if fit is not None:
         # gates in their order: frames that forces contradict, then what is left in runs too short to judge

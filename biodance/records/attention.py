@@ -29,7 +29,7 @@ class LeftOut(StrEnum):
     SILENT_PLATE = "silent_plate"
     """A foot rests on a plate that reads nothing."""
     POSTURE_OPEN = "posture_open"
-    """The markers do not fix the posture."""
+    """The markers do not fix the posture, or only what was filled into their gaps does."""
     AT_AN_END = "at_an_end"
     """Beside an end of the recording the low-pass makes up the acceleration."""
     FORCES_DIFFER = "forces_differ"
