@@ -201,8 +201,8 @@ def damaged(numbers):
     good = File(points, analog).bytes()
     return {
         "the file is empty": b"",
-        "is not a C3D file: of its 2000": b"not a c3d file, just some text\n".ljust(2000, b"."),
-        "is not a C3D file: of its 700": good[:700],
+        "is not a C3D file: it does not begin as one": b"not a c3d file, just some text\n".ljust(2000, b"."),
+        "is not a C3D file: it has 700 bytes, and not 1024 at least": good[:700],
         "damaged or was cut off": File(points, parameters={"POINT": {"DESCRIPTIONS": text(*["x" * 200] * 9)}}).bytes()[
             :1500
         ],
