@@ -49,12 +49,13 @@ def test_cycles_that_scatter_widely_are_no_spikes() -> None:
     assert repetitions_of("gait", [trial("walk", curves)]).left_out == ()
 
 
-def test_a_trial_whose_cycles_are_all_unlike_the_others_holds_another_movement_and_no_spikes() -> None:
-    quick = [curve(cycle(k, trial="quick"), (60.0 + k) * SHAPE) for k in range(8)]
-    slow = [curve(cycle(k, trial="slow"), (110.0 + k) * SHAPE) for k in range(3)]
-    assert repetitions_of("gait", [trial("quick", quick), trial("slow", slow)]).left_out == ()
-    alone = repetitions_of("gait", [trial("quick", quick), trial("slow", slow[:1])])
-    assert [one.cycle for one in alone.left_out] == [slow[0].cycle]
+def test_deeper_and_offset_repetitions_are_no_spikes_and_a_spike_in_one_of_them_is() -> None:
+    alike = [curve(cycle(k), (60.0 + k) * SHAPE) for k in range(8)]
+    assert repetitions_of("gait", [trial("walk", [*alike, curve(cycle(9), 110.0 * SHAPE - 8.0)])]).left_out == ()
+    spoilt = 110.0 * SHAPE - 8.0
+    spoilt[40:44] += 60.0
+    (out,) = repetitions_of("gait", [trial("walk", [*alike, curve(cycle(9), spoilt)])]).left_out
+    assert (out.because, out.cycle) == (LeftOutBecause.SPIKE, cycle(9))
 
 
 def test_a_turn_leaves_out_the_whole_cycle_also_over_the_seam() -> None:

@@ -384,9 +384,10 @@ def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue], usual: Sequen
 def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
     """Return all repetitions of a ``kind`` in the ``trials`` of a session, with what counts in no mean set apart.
 
-    A turn leaves out the whole cycle; a spike the curve in which it is: its largest distance to the median curve is
-    `_FAR` times that of the middle one and beyond `_LEAST` (compare Sangeux and Polak 2015,
-    doi:10.1016/j.gaitpost.2014.12.004, who rank strides by it); a plate under both feet the loads of a gait cycle.
+    A turn leaves out the whole cycle; a spike the curve in which it is: its largest distance to the median curve, taken
+    in the size and offset that are nearest, is `_FAR` times that of the middle one and beyond `_LEAST` (compare Sangeux
+    and Polak 2015, doi:10.1016/j.gaitpost.2014.12.004, who rank strides by the distance itself); a plate under both
+    feet the loads of a gait cycle.
     """
     cycles = tuple(one for trial in trials for one in trial.cycles if one.kind == kind)
     turned = _turned(trials) if kind == "gait" else []
@@ -417,16 +418,19 @@ def _turned(trials: Sequence[TrialMovement]) -> list[Cycle]:
 
 
 def _spikes(same: Sequence[CycleCurve]) -> list[CycleCurve]:
-    """Return the curves of one quantity and side that leave the others far behind; where most of a trial do, it holds
-    another movement (slow squats beside quick ones) and no spikes.
+    """Return the curves of one quantity and side that leave the others far behind, whatever size and offset they have:
+    a deeper squat is no spike.
     """
     if len(same) < _FEWEST or same[0].unit not in _LEAST or same[0].quantity.startswith("centre_of_mass"):
         return []
     values = np.stack([one.value for one in same])
     known = np.isfinite(values).any(axis=0)
-    # Largest distance over the cycle to the median curve of all.
-    apart = np.nan_to_num(np.abs(values[:, known] - np.nanmedian(values[:, known], axis=0))).max(axis=1, initial=0.0)
+    median, apart = np.nanmedian(values[:, known], axis=0), np.zeros(len(same))
+    for k, value in enumerate(values[:, known]):
+        own = np.isfinite(value)
+        if own.any():
+            # Least squares on the median curve and a constant; the largest distance over the cycle that is left.
+            usual = np.column_stack([median[own], np.ones(own.sum())])
+            apart[k] = np.abs(value[own] - usual @ np.linalg.lstsq(usual, value[own], rcond=None)[0]).max()
     far = max(_LEAST[same[0].unit], _FAR * float(np.median(apart)))
-    sizes = grouped((one.cycle.trial, size) for one, size in zip(same, apart, strict=True))
-    other = {trial for trial, own in sizes.items() if len(own) > 1 and np.median(own) > far}
-    return [one for one, size in zip(same, apart, strict=True) if size > far and one.cycle.trial not in other]
+    return [one for one, size in zip(same, apart, strict=True) if size > far]
