@@ -12,7 +12,7 @@ from biodance.body.human.measures import (
     Measures,
 )
 from biodance.body.human.scaling import chain_angles, measure_static
-from biodance.body.human.skeleton import SIDES, standing_tilt
+from biodance.body.human.skeleton import standing_tilt
 from biodance.body.human.static_centres import arm_centres
 from biodance.body.parts import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused
@@ -20,7 +20,7 @@ from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.records import Markers, Source, Subject, Trial
+from biodance.records import SIDES, Markers, Source, Subject, Trial
 from biodance.records.attention import NotUsed
 from biodance.spatial import elementary_rotation
 

@@ -8,8 +8,9 @@ import pytest
 from human_cases import CORNERS, human_case, moving
 
 from biodance.body.body import Body
-from biodance.body.changes import Cut, recentre_joint, with_part
+from biodance.body.changes import recentre_joint, with_part
 from biodance.body.human.human import human
+from biodance.body.human.skeleton import collar_bone
 from biodance.body.parts import JointError, shift_matter, smallest_eigenvalues
 from biodance.diagnosis.accept import case_fit
 from biodance.effects import UNLIKE, Case, effect
@@ -101,16 +102,7 @@ def test_a_collar_bone_is_asked_for_where_the_other_one_moves_already(side: str)
     case, other = human_case(120), "left" if side == "right" else "right"
     both = KINDS["shoulder_girdle"](case)
     assert both is not None
-    cut = Cut(
-        "trunk_head",
-        f"{side}_clavicle",
-        {f"{side}_clavicle_elevation": np.array([1.0, 0.0, 0.0])},
-        np.array([0.05, 0.4, 0.02 if side == "right" else -0.02]),
-        np.zeros(10),
-        (),
-        (case.body.joint_index(f"{side}_shoulder_flexion"),),
-    )
-    one = with_part(case.body, cut)
+    one = with_part(case.body, collar_bone(case.body, side))
     asked = KINDS["shoulder_girdle"](replace(case, body=one))
     assert asked is not None
     assert [joint.name for joint in asked.joints if joint.name not in [j.name for j in one.joints]] == [

@@ -1,13 +1,12 @@
 """The shoulders move on the trunk: shrugging, reaching; the model has them fixed."""
 
-import numpy as np
-
 from biodance.body.body import Body
-from biodance.body.changes import Cut, with_part
-from biodance.body.human.skeleton import shoulders, sternoclavicular
+from biodance.body.changes import with_part
+from biodance.body.human.skeleton import collar_bone, shoulders
 from biodance.effects._base.case import Case
 from biodance.effects._base.missing_joint import MissingJoint, angle_and_beyond, doubting
 from biodance.effects._base.words import About, CauseWords, CheckKind
+from biodance.records import SIDES
 
 SHOULDERS = ("RSHO", "LSHO")
 """Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show
@@ -53,18 +52,11 @@ class ShoulderGirdle(MissingJoint):
         """
         body = case.body
         seen = {body.markers.names[c] for c in case.marker_columns}
-        missing = [side for side in ("right", "left") if f"{side}_clavicle" not in body.links]
+        missing = [side for side in SIDES if f"{side}_clavicle" not in body.links]
         if shoulders(body) is None or not seen.issuperset(SHOULDERS) or not missing:
             return None
         for side in missing:
-            sign = 1.0 if side == "right" else -1.0
-            shoulder = body.joint_index(f"{side}_shoulder_flexion")
-            place = sternoclavicular(body, side)
-            axes = {
-                f"{side}_clavicle_elevation": -sign * np.eye(3)[0],
-                f"{side}_clavicle_protraction": sign * np.eye(3)[1],
-            }
-            body = with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
+            body = with_part(body, collar_bone(body, side))
         return doubting(body, SHOULDERS)
 
 

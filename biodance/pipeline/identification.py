@@ -90,9 +90,9 @@ def mass_check(subject: Subject, weighed: Weighing | None, limits: CheckLimits) 
     """Compare the mass on the plates, by its 95 % interval, with the declared mass, where both are known."""
     if weighed is None or not np.isfinite(subject.declared_mass):
         return []
-    difference = abs(100 * (weighed.mass / subject.mass - 1))
-    unsure, kilograms = 196 * weighed.sd / subject.mass, f"{weighed.mass:.1f} ± {1.96 * weighed.sd:.1f} kg"
-    advice = f"{kilograms} by {weighed.by.value}: weigh again, or check the plates' zero."
+    half = 1.96 * weighed.sd  # kg
+    difference, unsure = 100 * abs(weighed.mass / subject.mass - 1), 100 * half / subject.mass
+    advice = f"{weighed.mass:.1f} ± {half:.1f} kg by {weighed.by.value}: weigh again, or check the plates' zero."
     said, limit = f"{difference:.1f} ± {unsure:.1f} %", f"at most {limits.mass:g} %"
     return [Check(_MASS, ", ".join(weighed.trials), said, limit, bool(difference - unsure <= limits.mass), advice)]
 

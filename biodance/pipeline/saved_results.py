@@ -95,7 +95,8 @@ _TEXTS = ("marker_names", "notes", "joint_names")
 class KeptResults:
     """A results folder as read: ``body`` with ``source`` in words; ``motions`` by trial; ``hashes`` of the recordings
     by trial, what their ``loads`` sum to after preparing (N·s, N·m·s), and their ``cutoffs`` (Hz); the ``corrections``
-    with which plates were made; ``session`` folder of the recordings, whose ``settings`` were chosen.
+    that were made to plates before the body was fitted; ``session`` folder of the recordings, whose ``settings`` were
+    chosen.
     """
 
     body: Body

@@ -1,10 +1,10 @@
 """How numbers and sentences are put before a person."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from biodance.diagnosis.diagnosis import ABOUT
+from biodance.diagnosis.diagnosis import ABOUT, Verdict
 from biodance.display import SHOWN_UNITS, cause_in_words, spaced
 from biodance.identification.knowledge import SIGMAS
 from biodance.records import grouped
@@ -13,14 +13,14 @@ from biodance.records.attention import Attention, told_together
 _ABSURD = 30.0  # Typical sizes above which a size from which something is seen means never
 NEVER = "never"
 """Said of such a size."""
-DIAGNOSED = {
+DIAGNOSED: Mapping[Verdict, str] = {
     "nothing wrong": "found nothing wrong",
     "named, complete": "named the causes of all that it found",
     "named, incomplete": "named causes of some of what it found, and left other differences without a cause",
     "unexplained": "found differences for which it could name no cause",
 }
 """What a diagnosis came to, by its verdict."""
-IN_SHORT = {
+IN_SHORT: Mapping[Verdict, str] = {
     "named, complete": "cause found",
     "named, incomplete": "cause found, more is open",
     "unexplained": "cause not known",

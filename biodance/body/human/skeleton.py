@@ -315,14 +315,17 @@ def neck_and_vertex(body: Body) -> tuple[Array, Array] | None:
     return middle + _NECK * (vertex - middle), vertex
 
 
-def sternoclavicular(body: Body, side: str) -> Array:
-    """Return the inner end of a collar bone, (3,) m in the trunk's frame, of a body with shoulders."""
-    middle = shoulders(body)
+def collar_bone(body: Body, side: str, markers: tuple[str, ...] = ()) -> Cut:
+    """Return the cut that lets a shoulder and some ``markers`` of the trunk turn about the inner end of the collar
+    bone, of a body with shoulders; it takes no matter from the trunk.
+    """
+    middle, arm = shoulders(body), body.joint_index(f"{side}_shoulder_flexion")
     assert middle is not None
-    _, shoulder = body.place_on_segment(body.joint_index(f"{side}_shoulder_flexion"))
-    return np.asarray(
-        middle + abs(float(shoulder[2])) * _STERNOCLAVICULAR * [1.0, 1.0, 1.0 if side == "right" else -1.0]
-    )
+    _, shoulder = body.place_on_segment(arm)
+    outwards = [1.0, 1.0, 1.0 if side == "right" else -1.0]
+    # (3,) m in the trunk's frame.
+    place = np.asarray(middle + abs(float(shoulder[2])) * _STERNOCLAVICULAR * outwards)
+    return Cut("trunk_head", f"{side}_clavicle", _axes("clavicle", side), place, np.zeros(10), markers, (arm,))
 
 
 def shoulders(body: Body) -> Array | None:
@@ -356,15 +359,11 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
 def _with_clavicle(body: Body, side: str) -> Body:
     if shoulders(body) is None:
         return body
-    shoulder = body.joint_index(f"{side}_shoulder_flexion")
-    _, centre = body.place_on_segment(shoulder)
+    _, centre = body.place_on_segment(body.joint_index(f"{side}_shoulder_flexion"))
     seen = _worn(
         body, "trunk_head", np.linalg.norm(body.markers.position - centre, axis=1) < _ACROMION * abs(centre[2])
     )
-    if not seen:
-        return body
-    place, axes = sternoclavicular(body, side), _axes("clavicle", side)
-    return _ranged(with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), seen, (shoulder,))))
+    return _ranged(with_part(body, collar_bone(body, side, seen))) if seen else body
 
 
 def _with_wrist(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
