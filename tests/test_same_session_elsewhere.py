@@ -1,5 +1,6 @@
 """What is wrong with a session does not hang on where the laboratory puts its axes, on the order of its markers, nor on
-which side is which: the same people turned, mirrored and reordered come out the same.
+which side is which: the same people turned, mirrored and reordered come out the same. Nor does it hang on whether the
+file says where its plates lie: feet that stand partly beside them are left out either way.
 """
 
 import re
@@ -103,3 +104,38 @@ def test_a_session_comes_out_as_before(
     for effect, size in sizes[0].items():
         # 0.02 kg: a declared mass is what has a size here.
         assert sizes[1][effect] == pytest.approx(size, abs=0.02)
+
+
+def unplaced(session: Session) -> Session:
+    """Return the session as force files of OpenSim hold it: nothing says where the plates lie."""
+    trials = []
+    for trial in session.trials:
+        plates = tuple(replace(plate, placed=False) for plate in trial.plates)
+        trials.append(replace(trial, plates=plates))
+    return replace(session, trials=tuple(trials))
+
+
+@pytest.mark.parametrize(
+    ("folder", "half", "named"),
+    [
+        # Both feet 32 and 18 mm beside the plates while they stand; 78.1 kg by Newton, 81.0 declared.
+        ("c3d_parser_FMC", {"MH0222_BP01", "MH0222_BP08"}, {"body_mass"}),
+        # The last right foot 121 and 128 mm beside.
+        ("c3d_parser_Sydney", {"S4-AMGait04", "S4-AMGait05"}, set()),
+        # The last left foot 40 mm beside.
+        ("biomechzoo/HC038A", {"HC038A27"}, {"labels_swapped"}),
+        ("biomechzoo/HC044A", set(), set()),
+    ],
+)
+def test_a_foot_half_beside_is_seen_where_the_plates_have_no_place(
+    data: Path, folder: str, half: set[str], named: set[str]
+) -> None:
+    session = unplaced(read_session(data / folder))
+    with one_thread():
+        result = examine(session)
+    found = {one.name: one.contact.half for one in result.trials if one.contact is not None and one.contact.half}
+    assert set(found) == half
+    told = diagnose_session(result).diagnosis
+    assert {one.effect for one in told.findings} == named
+    # Nobody is told that all is well of steps that were not judged.
+    assert {one.trial for one in told.attention if "corners in session.toml" in one.text} == half

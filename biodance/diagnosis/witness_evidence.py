@@ -24,7 +24,7 @@ from biodance.observations import (
     sign_reversals,
     with_changed_plate,
 )
-from biodance.records import Array, Session
+from biodance.records import Array, LeftOutSpan, Session
 
 _FAULT = 4.0
 """A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
@@ -186,14 +186,16 @@ def collect_evidence(
     session: Session,
     chosen: Chosen[Effect | DiscreteEffect] = None,
     norms: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    half: Mapping[str, tuple[LeftOutSpan, ...]] = MappingProxyType({}),
 ) -> ObservedEvidence:
     """Return the observations of all observers in all trials of a session except skipped ones. ``chosen`` restricts the
-    causes; ``norms`` are those of the laboratory (`Tolerances.norms`).
+    causes; ``norms`` are those of the laboratory (`Tolerances.norms`); ``half`` by trial when a foot may stand partly
+    beside its plate (`Contact.half`).
     """
     asked = causes(chosen)
     mass, declared = session.subject.mass, "mass" not in session.subject.guessed
     judged = [trial for trial in session.trials if trial.plates and trial.role != "skip"]
-    seen = tuple(recording(trial, mass=mass, declared=declared) for trial in judged)
+    seen = tuple(recording(trial, mass=mass, declared=declared, half=half.get(trial.name, ())) for trial in judged)
     single = all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     by_trial = [tuple(_apply_norm(o, norms) for o in _correlate_strides(observe(one))) for one in seen]

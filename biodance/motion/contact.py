@@ -30,7 +30,7 @@ from biodance.motion.soles import (
     sitting,
     standing_on,
 )
-from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
+from biodance.records import SIDES, Array, LeftOut, LeftOutSpan, Mask, Plate, Trial, Wrench, runs
 from biodance.settings import ContactRules
 
 _FALLS = 0.6
@@ -292,7 +292,8 @@ class Contact:
     loaded; ``notes`` how many frames remain, and why no others; ``told`` (T, 2) True where the plates tell what the
     ground does to this foot, whatever the other one stands on; ``left_out`` the frames (T,) that are not measured, by
     every reason that holds for them; ``seated`` (T,) True where the person sits on the plates (empty: nowhere);
-    ``silent`` the plates that read no load under a resting foot, most of which is over them.
+    ``silent`` the plates that read no load under a resting foot, most of which is over them; ``half`` when a foot may
+    stand partly beside a plate whose place the file does not tell.
     """
 
     time: Array
@@ -305,6 +306,7 @@ class Contact:
     left_out: Mapping[LeftOut, Mask] = field(default_factory=dict)
     seated: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
     silent: tuple[str, ...] = ()
+    half: tuple[LeftOutSpan, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from biodance.lab.markers.upright import is_still
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
 from biodance.motion.soles import inside
 from biodance.observations._feet import FootPath, Track, feet_of, median_known, pelvis_path, pressed_between, track_of
-from biodance.records import Array, Index, Plate, Trial, Wrench, runs
+from biodance.records import Array, Index, LeftOutSpan, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
@@ -72,8 +72,9 @@ class SeenTrial:
     """One ``trial`` with the ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their markers are
     missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and whether
     somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not seen);
-    ``declared`` False: nobody said the mass, so that the plates can be held against each other alone. ``kept`` holds
-    what several observers ask for.
+    ``declared`` False: nobody said the mass, so that the plates can be held against each other alone; ``half`` when a
+    foot may stand partly beside a plate whose place the file does not tell. ``kept`` holds what several observers ask
+    for.
     """
 
     trial: Trial
@@ -84,6 +85,7 @@ class SeenTrial:
     still: bool
     trunk: Trunk | None = None
     declared: bool = True
+    half: tuple[LeftOutSpan, ...] = ()
     kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def plate(self, name: str) -> Plate:
@@ -174,6 +176,8 @@ class SeenTrial:
         is not known, the pressure lies between them, as far as it is known: what stands beside is not measured.
         """
         plates = [plate for plate in self.trial.plates if plate.placed]
+        if self.half:
+            return False
         if not self.feet or len(plates) < len(self.trial.plates):
             return self.pelvis is None or pressed_between(self.feet, self.total, self.pelvis)
         soles = [foot.outline(np.linspace(foot.time[0], foot.time[-1], 10)) for foot in self.feet]
@@ -188,11 +192,15 @@ class SeenTrial:
         return track_of(self.trial.markers.time, self.pelvis)
 
 
-def recording(trial: Trial, *, mass: float = float("nan"), declared: bool = True) -> SeenTrial:
+def recording(
+    trial: Trial, *, mass: float = float("nan"), declared: bool = True, half: tuple[LeftOutSpan, ...] = ()
+) -> SeenTrial:
     """Return a trial as observers look at it; as read (forces at their own rate) it says most.
 
-    ``mass`` kg as ``declared``, or as guessed; NaN = unknown. Feet and pelvis are found by the trial's marker set, and
-    by the known ones where it has none. Without foot markers or plates there are no steps; nothing is raised.
+    ``mass`` kg as ``declared``, or as guessed; NaN = unknown. ``half`` spans in which a foot may stand partly beside a
+    plate whose place the file does not tell (`Contact.half`): they hold no step. Feet and pelvis are found by the
+    trial's marker set, and by the known ones where it has none. Without foot markers or plates there are no steps;
+    nothing is raised.
     """
     known = (trial.marker_set,) if trial.marker_set else tuple(FAMILY.files())
     feet = feet_of(trial.markers, known)
@@ -204,8 +212,9 @@ def recording(trial: Trial, *, mass: float = float("nan"), declared: bool = True
         if feet
     )
     pelvis = pelvis_path(trial.markers, known)
-    steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass), declared)
+    whole = (step for step in steps if not any(step.side == one.side and one.holds(step.middle) for one in half))
+    steps = tuple(sorted(whole, key=lambda step: step.middle))
+    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass), declared, half)
 
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:

@@ -20,7 +20,7 @@ from biodance.inference.session import judge, see
 from biodance.pipeline.accepted import accepted, with_faults_undone, with_proven_corrections
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification, load_doubts
-from biodance.pipeline.judged_trials import chosen_windows, judged_trials, left_out
+from biodance.pipeline.judged_trials import chosen_windows, half_spans, judged_trials, left_out
 from biodance.pipeline.results import SessionDiagnosis, SessionResult
 from biodance.pipeline.session import identified
 from biodance.pipeline.words import LOAD, cause_of, explained
@@ -196,7 +196,7 @@ def _judged(
     failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
     tell("observing feet on plates, clocks, weights")
     known = tolerances or shipped()
-    evidence = collect_evidence(result.session, asked, known.norms)
+    evidence = collect_evidence(result.session, asked, known.norms, half_spans(result.trials))
     # what feet, clocks and weights measure on spoilt channels has no size
     if any(asked[quality.effect].raw for quality in failed if quality.effect in asked):
         evidence = evidence.only(_ANYWAY)

@@ -1,6 +1,6 @@
 """Which trials of a session the diagnosis looks at, and why it leaves others out."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +10,12 @@ from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.effects import Case, QualityCheck, Recorded, check_quality
 from biodance.lab.markers.time_axis import of_postures
+from biodance.motion.half_steps import half_steps, stances, told_of, without
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial import TrialResult
-from biodance.records import LeftOut, Plate, Role, Trial, Wrench
+from biodance.pipeline.trial import TrialResult, compared
+from biodance.pipeline.words import first_upper
+from biodance.records import LeftOut, LeftOutSpan, Plate, Role, Trial, Wrench
 from biodance.records.attention import Judged
 
 _ENOUGH = 10.0
@@ -53,6 +55,29 @@ def _with_every_plate(trial: Trial, every: Mapping[str, Plate]) -> Trial:
         for name, plate in sorted(every.items())
     )
     return replace(trial, plates=tuple(plates))
+
+
+def half_steps_left_out(results: Sequence[TrialResult], body: Body | None, mass: float) -> list[TrialResult]:
+    """Return the examined trials of a session without the steps of feet that may be partly beside a plate whose place
+    the file does not tell (`half_steps`); ``mass`` kg of the body, NaN = unknown.
+    """
+    every = [
+        stances(one.trial, one.contact, weight=one.trial.settings.gravity * mass) if one.contact is not None else ()
+        for one in results
+    ]
+    found = list(results)
+    for k, some in enumerate(half_steps(every)):
+        one, contact = results[k], results[k].contact
+        if some and contact is not None:
+            text = f"{first_upper(told_of(some))}. Give their corners in session.toml ([plates]), or check them."
+            trial = replace(one.trial, warnings=(*one.trial.warnings, text))
+            found[k] = compared(replace(one, trial=trial, contact=without(contact, some)), body)
+    return found
+
+
+def half_spans(results: Sequence[TrialResult]) -> dict[str, tuple[LeftOutSpan, ...]]:
+    """Return by trial when a foot may stand partly beside a plate whose place the file does not tell."""
+    return {one.name: one.contact.half for one in results if one.contact is not None}
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:

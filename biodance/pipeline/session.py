@@ -28,6 +28,7 @@ from biodance.pipeline.identification import (
     weigh,
     with_weighed_mass,
 )
+from biodance.pipeline.judged_trials import half_steps_left_out
 from biodance.pipeline.results import Placed, SessionResult
 from biodance.pipeline.trial import ON_A_FRAME, Step, TrialResult, attempt, examine_trial, prepare_trial
 from biodance.records import Markers, Session
@@ -58,6 +59,7 @@ def _examined(
             results.append(examine_trial(one, placed.body, mass=mass, before=before))
     except KeyboardInterrupt:
         results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
+    results = half_steps_left_out(results, placed.body, mass)
     moving = any(step.name == ON_A_FRAME for step in placed.steps)
     return tuple(replace(one, checks=tuple(trial_checks(one, mass, on_a_frame=moving))) for one in results)
 

@@ -422,9 +422,8 @@ def examine_trial(
     read: TrialResult, body: Body | None, *, mass: float, before: TrialResult | None = None
 ) -> TrialResult:
     """Take a prepared trial (`prepare_trial`) through the remaining steps; ``mass`` kg of the body, NaN = unknown;
-    ``before`` the same trial, examined with other forces: the body has followed these markers.
-
-    What has no markers or no body is not tracked, what has no plates is not compared: each is a step with its reason.
+    ``before`` the same trial, examined with other forces: the body has followed these markers. What has no markers or
+    no body is not tracked, what has no plates is not compared: each is a step with its reason.
     """
     if not read.usable:
         return read
@@ -436,21 +435,28 @@ def examine_trial(
     fit = marker_fit(motion, groups) if motion else None
     if not trial.plates:
         none = f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with."
-        steps.append(Step("wrench", "refused", none))
-        return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
+        return TrialResult(trial, (*steps, Step("wrench", "refused", none)), read.gaps, fit, motion)
     if not trial.marker_set:
         # no body can follow unknown labels, but whoever stands still can be weighed
         everything = np.asarray(np.isfinite(trial.wrench.value).all(axis=1))
         standing = attempt(steps, "standing", lambda: quiet_standing(trial, everything, None, None))
         return TrialResult(trial, tuple(steps), read.gaps, standing=standing)
     contact = attempt(steps, "contact", lambda: ground_contact(trial, feet(trial, body, motion), mass=mass))
-    comparison = standing = None
-    if contact is not None:
-        standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
-    if contact is not None and body is not None and motion is not None:
-        comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
-    done = TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing, contact=contact)
-    return done if contact is None or body is None else replace(done, left_out=_left_out(done, contact, body))
+    return compared(TrialResult(trial, tuple(steps), read.gaps, fit, motion, contact=contact), body)
+
+
+def compared(one: TrialResult, body: Body | None) -> TrialResult:
+    """Return a trial with what its contact lets judge: quiet standing, the wrenches, and what is left out of them."""
+    contact, motion = one.contact, one.motion
+    if contact is None:
+        return one
+    steps = [step for step in one.steps if step.name not in ("standing", "compare")]  # of an earlier contact
+    standing = attempt(steps, "standing", lambda: quiet_standing(one.trial, contact.measured, body, motion))
+    if body is None or motion is None:
+        return replace(one, steps=tuple(steps), standing=standing)
+    comparison = attempt(steps, "compare", lambda: compare_wrenches(one.trial, body, motion, contact))
+    done = replace(one, steps=tuple(steps), comparison=comparison, standing=standing)
+    return replace(done, left_out=_left_out(done, contact, body))
 
 
 def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, float]:
@@ -489,7 +495,6 @@ def contact_of(one: TrialResult, body: Body) -> Contact | None:
     """Return the ground contact of an examined trial; None without plates, or where it is refused."""
     if one.contact is not None or not one.trial.plates or one.motion is None:
         return one.contact
-    try:
+    with suppress(BiodanceError):
         return ground_contact(one.trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
-    except BiodanceError:
-        return None
+    return None
