@@ -198,7 +198,7 @@ class CheckLimits(Group):
     The RMS marker distance follows OpenSim's user guide; the mass is shoes, clothes and a meal, beyond the 95 %
     interval of the weighing. Forces, the largest marker distance and those of trunk and head are what clean real
     sessions leave, with a margin: 79 trials of 12 public laboratories
-    (docs/decisions/2026-11-26-limits-of-clean-sessions.md). Hicks et al. 2015 (doi:10.1115/1.4029304) ask 5 % of the
+    (docs/decisions/2026-11-21-data-quality-checks.md). Hicks et al. 2015 (doi:10.1115/1.4029304) ask 5 % of the
     forces of a walk, of models with residual actuators at the pelvis.
     """
 

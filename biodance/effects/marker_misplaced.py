@@ -83,7 +83,7 @@ class MarkerMisplaced(Effect):
     @property
     def unlike(self) -> float:
         """How far the wrench of a posture that a marker pulls along is from its derivative; learned where sizes were
-        inferred from all rows (docs/decisions/2026-11-22-sizes-as-shown.md).
+        inferred from all rows (docs/decisions/2026-11-21-detection-limits.md).
         """
         return 0.46
 

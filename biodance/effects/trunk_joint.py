@@ -52,7 +52,7 @@ class TrunkJoint(MissingJoint):
     explains = (CheckKind.MARKERS,)
     size_error = 0.5
     """Markers of six people showed 67 to 182 % of the angle: without any on the loins it is split between two joints as
-    one of them is assumed to lie (docs/decisions/2026-11-22-sizes-as-shown.md).
+    one of them is assumed to lie (docs/decisions/2026-11-21-detection-limits.md).
     """
     natural = 0.040
     """Root mean square of thirty virtual sessions, whose thorax moves by 1.2 deg on two axes."""

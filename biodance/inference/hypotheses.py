@@ -83,7 +83,7 @@ class Hypothesis:
 
     def whole(self, one: NamedCause) -> Array:
         """Return the size (p,) of a cause with what its own tolerance, or the body, has taken of it: both look alike,
-        and the sum is what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
+        and the sum is what is there (docs/decisions/2026-11-21-detection-limits.md).
         """
         where, unit = self.rows.tolerated.get(one.names, (slice(0), np.zeros((one.theta.size, 0))))
         size = np.asarray(one.theta + unit @ self.coefficients[where])
