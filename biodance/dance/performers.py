@@ -16,10 +16,9 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
-from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit
+from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit, Margin
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import path_in, phase_at
-from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
 
@@ -49,16 +48,6 @@ class Imprecision:
 
 
 USUAL_IMPRECISION = Imprecision()
-
-
-def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
-    """Return instants (T,) s of a performance, and those of the plan (T,) s that belong to them."""
-    time = np.arange(round(duration * how.pace * _RATE) + 1) / _RATE
-    # Lognormal: the tempo is never negative.
-    tempo = np.exp(how.timing * _noise(rng, time, 1, _TEMPO)[:, 0])
-    # Trapezoidal rule: how much is done by every instant, in any unit.
-    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
-    return time, duration * done / done[-1]
 
 
 def _noise(
@@ -112,7 +101,7 @@ class PlannedDance:
         counts = [max(2, round((phase.end - phase.start) * _PLAN_RATE)) for phase in near]
         spread = [np.linspace(p.start, p.end, n, endpoint=False) for p, n in zip(near, counts, strict=True)]
         time: Array = np.unique(np.round(np.concatenate(spread), 9))
-        rows, parts = self.phase_at(time), list[Array]()
+        rows, parts = phase_at(phases, time), list[Array]()
         for p in np.unique(rows):
             x = path_in(phases[p], dance.postures, dance.via, time[rows == p])[0]
             parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))  # they hold their feet
@@ -121,10 +110,6 @@ class PlannedDance:
         # What the plan keeps below (or above) straight legs; performers keep it, too.
         over = x[:, 2] - self._tops(x, up, ankle)
         self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
-
-    def phase_at(self, when: Array) -> NDArray[np.intp]:
-        """Return the phase (T,) at instants of the plan."""
-        return phase_at(self.dance.phases, when)
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
@@ -171,30 +156,22 @@ class PlannedDance:
 
     def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
         """Return the plan at ``when``, off by ``error`` rad (T, n - 3) and ``sway`` m (T, 2)."""
-        error = error.copy()
-        for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
-            error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
-        x, rows = self._off(when, error, sway, how)
-        return ImpreciseCopy(self.chain.body, time, self.chain.positions(x), self.stances, rows)
-
-    def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
-        chain, rows = self.chain, self.phase_at(when)
-        told = self.spline(when)
-        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2], told[:, -1]
-        if self.dance.stances[0].seat:
-            x[:, ROOT:] += error[:, 3:]
-            return x, rows
-        x[:, 3:ROOT] += how.pelvis * error[:, :3]
-        x[:, ROOT:] += error[:, 3:]
-        com = com + sway
-        (up, ankle), wanted = self._feet(rows, when), x.copy()
-        for k in range(_ROUNDS + 1):
-            x[:, 2] = self._tops(x, up, ankle) + over
-            x = self._standing(x, wanted, up, ankle)
-            if k < _ROUNDS:
-                # Newton: the centre of mass goes `_CARRIED` times as far as the pelvis.
-                x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
-        return x, rows
+        chain, rows, told, feet = self.chain, phase_at(self.dance.phases, when), self.spline(when), self.stances[0]
+        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2] + sway, told[:, -1]
+        moved = error[:, 3:].copy()
+        for side in feet.quiet:  # the frame holds the hand where it is, or the arm hangs
+            moved[:, np.array(chain.arm_columns[side]) - ROOT] = 0.0
+        x[:, ROOT:] += moved
+        if not feet.seat:
+            x[:, 3:ROOT] += how.pelvis * error[:, :3]
+            (up, ankle), wanted = self._feet(rows, when), x.copy()
+            for k in range(_ROUNDS + 1):
+                x[:, 2] = self._tops(x, up, ankle) + over
+                x = self._standing(x, wanted, up, ankle)
+                if k < _ROUNDS:
+                    # Newton: the centre of mass goes `_CARRIED` times as far as the pelvis.
+                    x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
+        return ImpreciseCopy(chain.body, time, chain.positions(x), self.stances, rows)
 
     def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
         """Return x (T, n) with legs that hold their feet, as far as these are not up; then they do as ``wanted``."""
@@ -311,8 +288,12 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 
 def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _Person:
     """Return performer ``k``, and the instants of the dance to or in the postures ``only``."""
-    time, when = draw_clock(np.random.default_rng([0, 7, k]), dance.duration, how)
-    part = slice(None)
+    time, part = np.arange(round(dance.duration * how.pace * _RATE) + 1) / _RATE, slice(None)
+    # Lognormal: the tempo is never negative.
+    tempo = np.exp(how.timing * _noise(np.random.default_rng([0, 7, k]), time, 1, _TEMPO)[:, 0])
+    # Trapezoidal rule: how much is done by every instant, in any unit.
+    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
+    when = dance.duration * done / done[-1]
     if only:
         posture = np.array([phase.posture for phase in dance.phases])[phase_at(dance.phases, when)]
         inside = np.flatnonzero(np.isin(posture, only))
@@ -333,7 +314,7 @@ def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -
     demanded there. Deviations are those towards the limit: an arm beside the head errs farther towards it than away.
     """
     plan = PlannedDance(dance)
-    when = when[~plan.stepping[plan.phase_at(when)]]
+    when = when[~plan.stepping[phase_at(dance.phases, when)]]
     if not when.size:
         return np.inf, ""
     copy, found = plan.held_by(when), [(np.inf, "")]
