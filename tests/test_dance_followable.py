@@ -12,11 +12,11 @@ from small_dances import BODY, small_dance
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.skeleton import joint_limits
-from biodance.dance import design
+from biodance.dance import design, performers
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.limits import Margin, _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import Imprecision, PerformersResult, PlannedDance, try_performers
+from biodance.dance.performers import PerformersResult, PlannedDance, try_performers
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.feet import support_sequence
@@ -188,9 +188,11 @@ def test_all_postures_of_the_words_stand_balanced_on_its_feet() -> None:
     np.testing.assert_array_equal(twice, np.arange(len(found.x)))
 
 
-def test_an_exact_performer_does_the_dance_itself() -> None:
-    exact = Imprecision(tracking=0.0, timing=0.0, sway=0.0, pace=1.0)
-    found = try_performers(small_dance(), PLAN.limits, who=(0,), how=exact)
+def test_an_exact_performer_does_the_dance_itself(monkeypatch) -> None:
+    with monkeypatch.context() as exact:
+        for name, value in {"_TRACKING": 0.0, "_TIMING": 0.0, "_SWAYS": 0.0, "_PACE": 1.0}.items():
+            exact.setattr(performers, name, value)
+        found = try_performers(small_dance(), PLAN.limits, who=(0,))
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
     least = next(one for one in PLAN.limits if one.name == "self_collision").for_imprecise().least
