@@ -34,7 +34,7 @@ from benchmarks.third_lab.write import lump_of
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array
-from biodance.virtual_lab.causes import hide, parse_cause
+from biodance.virtual_lab.causes import parse_cause
 from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import FIRST_VISIT, LabVisit, draw_laboratory, draw_visitor
@@ -135,8 +135,8 @@ def own(seed: int, text: str, drawn: bool, folder: Path) -> tuple[SessionResult,
         ):
             text = text.replace("target=", "target=plate1:")
     plan = replace(plan, trials=tuple(one for one in plan.trials if one.role != "validate"))
-    visit, loads = hide((parse_cause(text),) if text else (), who, plan, seed=seed, visit=visit)
-    simulate_session(who, plan, folder / "s", seed=seed, visit=visit, loads=loads)
+    hidden = (parse_cause(text),) if text else ()
+    simulate_session(who, plan, folder / "s", seed=seed, hidden=hidden, visit=visit)
     told = Told()
     if text:
         cause = parse_cause(text)

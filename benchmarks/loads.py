@@ -23,7 +23,7 @@ from biodance.identification.statistics import Fit
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import trial_fit
-from biodance.virtual_lab.causes import hide, parse_cause
+from biodance.virtual_lab.causes import parse_cause
 from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
@@ -47,8 +47,7 @@ def seen(lab: str, seed: int, visit: int, load: tuple[str, float] | None) -> See
         if lab == "own":
             who, plan = subject_of(seed), read_protocol("short")
             causes = (parse_cause(f"added_mass:target={load[0]},mass={load[1]}"),) if load else ()
-            how, loads = hide(causes, who, plan, seed=seed, visit=LabVisit(visit))
-            simulate_session(who, plan, place, seed=seed, visit=how, loads=loads)
+            simulate_session(who, plan, place, seed=seed, hidden=causes, visit=LabVisit(visit))
         else:
             carried = ("--cause", "added_mass", "--target", SEGMENTS[load[0]], "--size", load[1]) if load else ()
             run_foreign(seed, place, "--session", visit, *carried)

@@ -13,7 +13,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array, Plate, Subject
-from biodance.virtual_lab.causes import hide, parse_cause
+from biodance.virtual_lab.causes import parse_cause
 from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.visit import LabVisit
@@ -35,8 +35,8 @@ def hidden(
     """Write a session of few ``trials`` with something hidden in it; ``visit`` another day of the same person."""
     plan = read_protocol("diagnosis")
     plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.name in trials))
-    how, loads = hide(tuple(parse_cause(text) for text in texts), person, plan, seed=seed, visit=LabVisit(visit))
-    return simulate_session(person, plan, folder, seed=seed, visit=how, loads=loads)
+    causes = tuple(parse_cause(text) for text in texts)
+    return simulate_session(person, plan, folder, seed=seed, hidden=causes, visit=LabVisit(visit))
 
 
 def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
@@ -55,8 +55,7 @@ def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, 
 def standing_recording(folder: Path, *texts: str, visit: LabVisit) -> Path:
     """Write a session of somebody who stands, with something hidden in it; return the file of the fitted trial."""
     plan, person = read_protocol("standing"), Subject(60.0, 1.70, "F", 30.0)
-    visit, loads = hide(tuple(parse_cause(text) for text in texts), person, plan, seed=4, visit=visit)
-    simulate_session(person, plan, folder, seed=4, visit=visit, loads=loads)
+    simulate_session(person, plan, folder, seed=4, hidden=tuple(parse_cause(text) for text in texts), visit=visit)
     return next(path for path in sorted(folder.glob("*.c3d")) if "static" not in path.name)
 
 

@@ -28,7 +28,7 @@ BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
 def small_dance() -> Dance:
     """Return 1 s of standing, 2 s of raising the left arm to the side, 1 s with it raised."""
     chain = Chain(BODY)
-    stances = support_sequence(BODY, Plan("one_segment", "", (("parallel", 2),), hold=1.0))
+    stances = support_sequence(BODY, Plan("one_segment", (("parallel", 2),), hold=1.0))
     stand = initial_guess(chain, stances[0], np.random.default_rng(0))
     stand[2], stand[3:] = 0.86, 0.0
     for side in ("left", "right"):

@@ -25,7 +25,7 @@ from biodance.records import Subject
 from biodance.spatial import quaternion_matrix
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
-PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
+PLAN = Plan("small", (("parallel", 2), ("single_left", 2)), hold=1.0)
 
 
 @pytest.fixture(scope="module", autouse=True)

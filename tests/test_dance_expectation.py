@@ -86,7 +86,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
 
 # ---- What a dance that can be followed costs, and the sentences that say what it cannot teach
 
-PLAN = Plan("x", "", (("parallel", 4),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.35, gentle=True)
+PLAN = Plan("x", (("parallel", 4),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.35, gentle=True)
 
 
 def expected(mass: float, com: float) -> Expectation:

@@ -94,7 +94,7 @@ def test_verification_sees_a_hand_that_lets_go() -> None:
 def test_a_persons_file_puts_the_hand_on_the_frame_in_every_stance(tmp_path: Path) -> None:
     path = tmp_path / "person.toml"
     path.write_text('hold_frame = ["right"]\nstand_alone_on = ["left"]\n')
-    plan = Plan("p", "", (("parallel", 2), ("single_right", 2), ("single_left", 1)))
+    plan = Plan("p", (("parallel", 2), ("single_right", 2), ("single_left", 1)))
     body, plan, _ = fit_to_person(BODY, plan, read_person(path))
     feet = support_sequence(body, plan)
     assert all(np.isfinite(one.hands[0]).all() and np.isnan(one.hands[1]).all() for one in feet)

@@ -9,8 +9,15 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.expectation import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
-from biodance.dance.limits import family
+from biodance.dance.expectation import (
+    SAMPLE_ERROR,
+    SAMPLE_RATE,
+    PostureInformation,
+    learned,
+    standing_regressors,
+    update_posterior,
+)
+from biodance.dance.limits import Margin, family
 from biodance.dance.limits.ground_clearance import GroundClearance
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -27,7 +34,6 @@ from biodance.dance.search.known_postures import PostureTable
 from biodance.dance.search.move import Move, Task
 from biodance.dance.search.optimised_course import affordable, feasible_course, nearest_neighbours
 from biodance.dance.search.postures import KEPT, alike, initial_guess, solve
-from biodance.dance.verify import Margin
 from biodance.errors import BiodanceError
 from biodance.identification.posterior import prior_factor
 from biodance.motion.dynamics import regressor
@@ -36,7 +42,7 @@ from biodance.records import Array, Subject
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
 STANCES = ("parallel",) * 6 + ("single_right",) * 6
-PLAN = Plan("p", "", (("parallel", 6), ("single_right", 6)), hold=1.0)
+PLAN = Plan("p", (("parallel", 6), ("single_right", 6)), hold=1.0)
 
 
 def postures(seed: int) -> Array:
@@ -72,7 +78,7 @@ def information(x: Array, order: Sequence[int]) -> Array:
 
 def test_what_is_left_unknown_is_the_posterior_of_the_textbook(x: Array) -> None:
     known, table, order = PostureInformation(CHAIN, PLAN), BODY.sip.covariance, (3, 7, 0, 8)
-    posterior, still = known.beforehand, known.white(known.standing(x))
+    posterior, still = known.beforehand, known.white(standing_regressors(CHAIN, x))
     for p, before in zip(order, (0, 6, 3, 7), strict=True):
         way = known.of_ways(x[[before, p]][None])[0]
         posterior = update_posterior(posterior, np.concatenate([still[p], way]))
@@ -138,7 +144,7 @@ def test_learned_is_the_textbook_update() -> None:
 
 WOMAN = human(Subject(60.0, 1.65, "F", 45.0))
 WOMANS = Chain(WOMAN)
-TWO_FEET = Plan("small", "", (("parallel", 4),), hold=1.0)
+TWO_FEET = Plan("small", (("parallel", 4),), hold=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -278,7 +284,7 @@ BLOCKS = ("parallel", "right_forward", "single_right", "single_left")
 
 @pytest.mark.parametrize("names", list(permutations(BLOCKS)), ids="-".join)
 def test_no_foot_moves_unless_the_other_bears_the_weight(names):
-    stances = support_sequence(BODY, Plan("any", "", tuple((name, 2) for name in names)))
+    stances = support_sequence(BODY, Plan("any", tuple((name, 2) for name in names)))
     assert [s.name for s in stances if s.over is None] == [name for name in names for _ in range(2)]
     assert stances[-1].planted == (0, 1)
     for before, after in pairwise(stances):
@@ -292,17 +298,17 @@ def test_no_foot_moves_unless_the_other_bears_the_weight(names):
 
 
 def test_who_may_not_stand_on_the_left_leg_never_steps():
-    stances = support_sequence(BODY, Plan("careful", "", (("parallel", 2), ("right_forward", 3)), alone=()))
+    stances = support_sequence(BODY, Plan("careful", (("parallel", 2), ("right_forward", 3)), alone=()))
     assert [(s.name, s.over) for s in stances] == [("parallel", None)] * 5
 
 
 def test_sitting_and_standing_do_not_mix():
     with pytest.raises(BiodanceError, match="stool"):
-        support_sequence(BODY, Plan("both", "", (("parallel", 2), ("seated", 3))))
+        support_sequence(BODY, Plan("both", (("parallel", 2), ("seated", 3))))
 
 
 def test_weight_over_one_foot_is_inside_both_bases():
-    feet = support_sequence(BODY, Plan("one", "", (("parallel", 1), ("single_left", 1))))[1]
+    feet = support_sequence(BODY, Plan("one", (("parallel", 1), ("single_left", 1))))[1]
     normals, offsets = feet.reduced(0.6)
     assert (normals @ feet.centre + offsets).min() > 0
     for base in (feet.on(0, 1), feet.on(1)):

@@ -142,7 +142,7 @@ class Quiet(Limit):
 
 
 def test_an_object_is_kept_like_a_member_of_the_family(tmp_path: Path) -> None:
-    plan = Plan("small", "", (("parallel", 2),), move=4.0, hold=1.0)
+    plan = Plan("small", (("parallel", 2),), move=4.0, hold=1.0)
     with ThreadPoolExecutor(1) as workers:
         free, _ = design(BODY, plan, seed=1, workers=workers)
         dance, margins = design(BODY, plan, seed=1, workers=workers, limits=[Quiet(), Friction(mu=0.3)])
@@ -214,6 +214,6 @@ def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
 
 def test_what_is_no_limit_is_not_taken_as_one() -> None:
     with pytest.raises(BiodanceError, match="lacks the base class Limit"):
-        Plan("small", "", (("parallel", 2),)).with_limits(["friction"])
+        Plan("small", (("parallel", 2),)).with_limits(["friction"])
     with pytest.raises(UnknownName, match="Legal: mu"):
         limits_with({"friction": {"my": 1.0}}, where="here")

@@ -348,4 +348,4 @@ def test_the_command_writes_a_template_and_never_over_a_file(
 
 def test_a_joint_that_a_body_does_not_have_is_named() -> None:
     with pytest.raises(UnknownName, match="elbov"):
-        fit_to_person(BODY, Plan("p", "", (("parallel", 2),)), PersonLimits(strengths=(("elbov", 0.5),)))
+        fit_to_person(BODY, Plan("p", (("parallel", 2),)), PersonLimits(strengths=(("elbov", 0.5),)))

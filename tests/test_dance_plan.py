@@ -78,7 +78,7 @@ def test_a_wrong_protocol_is_refused(tmp_path: Path, text: str, said: str) -> No
 
 
 def test_a_weight_of_no_segment_is_refused() -> None:
-    plan = Plan("p", "", (("parallel", 3),), weights=(("left_tail", 2.0),))
+    plan = Plan("p", (("parallel", 3),), weights=(("left_tail", 2.0),))
     with pytest.raises(UnknownName, match="left_tail"):
         plan.emphasis(BODY.segments)
 
@@ -132,7 +132,7 @@ def test_legs_that_may_not_carry_alone_leave_the_plan() -> None:
 
 
 def test_what_cannot_be_danced_is_refused_with_the_constraint() -> None:
-    only = Plan("left", "", (("single_left", 4),))
+    only = Plan("left", (("single_left", 4),))
     with pytest.raises(BiodanceError, match="neither leg"):
         fit_to_person(BODY, only, PersonLimits(stand_alone_on=()))
     with pytest.raises(BiodanceError, match="must sit"):

@@ -141,9 +141,7 @@ def test_extreme_eigenvalues_in_closed_form():
 # ---- Mirror images of postures
 
 STANCES = ("parallel", "right_forward", "single_right", "single_left")
-ALL_FEET = tuple(
-    s for s in support_sequence(BODY, Plan("all", "", tuple((name, 1) for name in STANCES))) if s.over is None
-)
+ALL_FEET = tuple(s for s in support_sequence(BODY, Plan("all", tuple((name, 1) for name in STANCES))) if s.over is None)
 
 
 @pytest.mark.parametrize("place", [0, 2, 3])

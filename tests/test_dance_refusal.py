@@ -85,7 +85,7 @@ def test_a_posture_at_its_limit_lacks_the_reserve_and_not_minus_nothing() -> Non
 
 # ---- known postures: what is not possible is left out, the rest is danced
 
-PLAN = Plan("p", "", (("parallel", 4), ("single_right", 2)), hold=1.0, instructions=3.0, wide=1.35, gentle=True)
+PLAN = Plan("p", (("parallel", 4), ("single_right", 2)), hold=1.0, instructions=3.0, wide=1.35, gentle=True)
 
 
 def test_what_is_not_possible_is_left_out_and_the_rest_is_kept() -> None:

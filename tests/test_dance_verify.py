@@ -10,14 +10,14 @@ from small_dances import BODY, small_dance, without_pictures
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import expect
-from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
+from biodance.dance.limits import CheckedMotion, Limit, Margin, Margins, Remaining, unconcerned
 from biodance.dance.limits.balance import Balance
 from biodance.dance.limits.joint_range import JointRange
-from biodance.dance.performers import Imprecision, try_performers
+from biodance.dance.performers import try_performers
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import Phase, basis_at, rest_to_rest
 from biodance.dance.problem.state import State
-from biodance.dance.verify import Margin, _least, broken, dance_metrics, verify
+from biodance.dance.verify import _least, broken, dance_metrics, verify
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance import DanceResult, not_safe
 from biodance.report.dance import write_dance
@@ -166,7 +166,7 @@ def test_no_samples_is_refused() -> None:
 
 LEADING = {"cues.md", "cues.html", "dance.c3d"}
 SHORT = Margin("self_collision_of_performers", -0.04, 1.0, "m", "left_forearm_hand - left_thigh")
-PLAN = Plan("one_segment", "", (("parallel", 2),), hold=1.0, instructions=4.0)
+PLAN = Plan("one_segment", (("parallel", 2),), hold=1.0, instructions=4.0)
 WHERE = "4.0 cm of the room between arms, legs and trunk that is needed are missing at 1 s"
 
 
@@ -238,10 +238,11 @@ def test_a_safe_dance_says_nothing(result: DanceResult, tmp_path: Path) -> None:
     assert all("NOT SAFE" not in (tmp_path / name).read_text() for name in ("cues.md", "cues.html"))
 
 
-def test_what_performers_lack_becomes_what_is_not_safe() -> None:
+def test_what_performers_lack_becomes_what_is_not_safe(monkeypatch: pytest.MonkeyPatch) -> None:
     """As much less is left as more is asked; less than nothing is not safe, and where it is, is said."""
-    swaying, limits = Imprecision(sway=0.02), ((Balance(room=room),) for room in (0.015, 0.1))
-    usual, strict = (try_performers(small_dance(), some, who=range(3), how=swaying) for some in limits)
+    monkeypatch.setattr("biodance.dance.performers._SWAYS", 0.02)
+    limits = ((Balance(room=room),) for room in (0.015, 0.1))
+    usual, strict = (try_performers(small_dance(), some, who=range(3)) for some in limits)
     (left,), (lacking,) = usual.margins, strict.margins
     assert left.limit == lacking.limit == "balance_of_performers"
     assert left.worst - lacking.worst == pytest.approx(0.085, abs=1e-12)

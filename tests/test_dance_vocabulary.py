@@ -19,7 +19,7 @@ from biodance.motion.kinematics import poses
 from biodance.records import SIDES
 
 CHAIN = Chain(BODY)
-PLAN = Plan("x", "", (("single_right", 3),), hold=1.0, instructions=4.0, simplicity=1.0, wide=1.3, lively=True)
+PLAN = Plan("x", (("single_right", 3),), hold=1.0, instructions=4.0, simplicity=1.0, wide=1.3, lively=True)
 STANCE = next(stance for stance in support_sequence(BODY, PLAN) if len(stance.planted) == 1)
 
 

@@ -12,10 +12,9 @@ from biodance.pipeline.results import SessionResult
 from biodance.records import LeftOut
 from biodance.records.attention import Judged, seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
-from biodance.virtual_lab.causes import hide, parse_cause
+from biodance.virtual_lab.causes import parse_cause
 from biodance.virtual_lab.movement import read_protocol
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.visit import LabVisit
 
 
 def test_a_frame_counts_once_at_the_first_gate() -> None:
@@ -39,8 +38,7 @@ def test_squats_whose_forces_come_late_are_not_judged(tmp_path: Path, monkeypatc
     """Forces that are 0.2 s late are taken out by the gate of forces: these seconds are not judged, and it is said."""
     plan = read_protocol("squat")
     late = (parse_cause("time_delay:delay=0.2"),)
-    how, loads = hide(late, SUBJECT, plan, seed=3, visit=LabVisit(0))
-    folder = simulate_session(SUBJECT, plan, tmp_path / "late", seed=3, visit=how, loads=loads)
+    folder = simulate_session(SUBJECT, plan, tmp_path / "late", seed=3, hidden=late)
     result = examined(folder, monkeypatch)
     rows = {row.trial: row for row in diagnose_session(result, effects=("time_delay",)).diagnosis.judged}
     squats = [one for one in result.trials if one.name.startswith("squat")]

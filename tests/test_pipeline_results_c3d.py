@@ -23,7 +23,7 @@ from biodance.virtual_lab.simulate import simulate_session
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     short = read_protocol("short")
-    protocol = Protocol("shorter", "", (short.trials[0], short.trials[2]), short.postures)
+    protocol = Protocol("shorter", (short.trials[0], short.trials[2]))
     return simulate_session(
         Subject(58.0, 1.66, "F", 28.0, "S07"), protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11
     )

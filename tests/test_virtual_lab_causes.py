@@ -59,8 +59,7 @@ def squats() -> Protocol:
 
 
 def made(folder: Path, plan: Protocol, *texts: str, visit: LabVisit = PERFECT) -> Trial:
-    visit, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
+    simulate_session(SUBJECT, plan, folder, seed=4, hidden=tuple(parse_cause(text) for text in texts), visit=visit)
     return read_trial(folder / "squat_1.c3d")
 
 

@@ -38,7 +38,7 @@ EXACT = Performer(tracking=0.0, pace=1.0)
 def dance() -> Dance:
     """Return two postures on both feet, one on the right leg, those in between included, straight ways between them."""
     chain, rng = Chain(BODY), np.random.default_rng(2)
-    stances = support_sequence(BODY, Plan("test", "", (("parallel", 2), ("single_right", 1)), hold=1.0))
+    stances = support_sequence(BODY, Plan("test", (("parallel", 2), ("single_right", 1)), hold=1.0))
     rows = []
     for stance in stances:
         for _ in range(40):

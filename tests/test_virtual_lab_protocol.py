@@ -59,7 +59,7 @@ def test_a_trial_returns_to_standing(tmp_path):
 def test_the_weight_goes_to_the_foot_that_stands(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(HEAD + '[[trials]]\nname = "a"\nsteps = [{to = "up", move = 1.0}]\n')
-    posture = read_protocol(path).postures["up"]
+    posture = read_protocol(path).trials[0].steps[0].to
     assert posture.raised == {"left"}
     assert posture.values["shift"] == (1.0,)
 

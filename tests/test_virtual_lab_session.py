@@ -41,7 +41,7 @@ FAITHFUL = PERFECT_INSTRUMENTS
 @pytest.fixture(scope="module")
 def protocol():
     short = read_protocol("short")
-    return Protocol("shorter", "", (short.trials[0], short.trials[2]), short.postures)
+    return Protocol("shorter", (short.trials[0], short.trials[2]))
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +131,7 @@ def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laborator
 
 def test_the_two_plates_carry_the_two_feet(tmp_path):
     short = read_protocol("short")
-    one_leg = Protocol("one leg", "", (short.trials[0], short.trials[1]), short.postures)
+    one_leg = Protocol("one leg", (short.trials[0], short.trials[1]))
     out = simulate_session(SUBJECT, one_leg, tmp_path / "S", seed=3, visit=LabVisit(0, Laboratory(plates=2), FAITHFUL))
     trial = read_c3d(out / "dance_1.c3d")
     right, left = sorted(trial.plates, key=lambda plate: plate.centre[1])
@@ -197,7 +197,7 @@ def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
 
 def test_loads_weigh_on_the_plate_but_not_in_what_the_analyst_declares(tmp_path, protocol):
     load = AddedLoad("left_forearm", 2.4, np.array([0.0, -0.1, 0.0]))
-    out = simulate_session(SUBJECT, protocol, tmp_path / "loaded", seed=11, loads=(load,), visit=LabVisit(1))
+    out = simulate_session(SUBJECT, protocol, tmp_path / "loaded", seed=11, visit=LabVisit(1, loads=(load,)))
     assert read_session(out).subject.mass == pytest.approx(58.0, abs=0.2)
     static = read_c3d(out / "static.c3d")
     assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(60.4, rel=0.01)

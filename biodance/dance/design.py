@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.limits import Limit
+from biodance.dance.limits import Limit, Margin
 from biodance.dance.limits._person import ArmLift
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, PerformersResult, try_performers
 from biodance.dance.problem.plan import Plan
@@ -21,7 +21,7 @@ from biodance.dance.search.course import Checkpoint, Course, DanceStep, DesignCo
 from biodance.dance.search.move import AMPLE, ENOUGH, other_moves
 from biodance.dance.search.optimised_course import optimised_course
 from biodance.dance.search.word_course import LEAST, NoNextPosture, WordSearch, word_course
-from biodance.dance.verify import Margin, broken, verify_with
+from biodance.dance.verify import broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 

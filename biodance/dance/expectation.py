@@ -31,7 +31,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.splines import rest_to_rest
+from biodance.dance.problem.splines import Phase, rest_to_rest
 from biodance.dance.visit_log import VisitLog
 from biodance.errors import BiodanceError
 from biodance.identification.knowledge import segment_quantities
@@ -76,10 +76,8 @@ class Expectation:
     @classmethod
     def of(cls, body: Body, duration: Array, posteriors: list[BodyPosterior]) -> "Expectation":
         """Return what ``posteriors`` (D) after each ``duration`` (D,) s say."""
-        sd = np.array([_deviations(posterior) for posterior in posteriors])
-        share = np.array([removed_shares(posterior) for posterior in posteriors])
-        mass, com, inertia = np.moveaxis(sd, 2, 0)
-        return cls(body.segments, duration, mass, com, inertia, share)
+        mass, com, inertia = np.moveaxis(np.array([*map(_deviations, posteriors)]), 2, 0)
+        return cls(body.segments, duration, mass, com, inertia, np.array([*map(removed_shares, posteriors)]))
 
 
 def _deviations(posterior: BodyPosterior) -> Array:
@@ -317,7 +315,13 @@ def score_performance(
     BiodanceError
         The dance has joints that the body has not, or nothing was recorded.
     """
-    _same_joints(dance, body)
+    names, own = ([joint.name for joint in one.joints] for one in (dance.body, body))
+    if [name for name in own if name in names] != names or dance.body.segments != body.segments:
+        other = sorted(set(names) ^ set(own)) or ["the order"]
+        raise BiodanceError(
+            f"Dance {dance.protocol}: was designed for a body with other joints than that of this session "
+            f"({', '.join(other[:3])}). Give the dance that was shown."
+        )
     if not any(use.any() for _, use in recorded):
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _FELT))
@@ -333,20 +337,10 @@ def score_performance(
     return PerformanceScore(dance.protocol, rows, _repetitions(dance, body, total, noise), seconds)
 
 
-def _same_joints(dance: Dance, body: Body) -> None:
-    names, own = ([joint.name for joint in one.joints] for one in (dance.body, body))
-    if [name for name in own if name in names] != names or dance.body.segments != body.segments:
-        other = sorted(set(names) ^ set(own)) or ["the order"]
-        raise BiodanceError(
-            f"Dance {dance.protocol}: was designed for a body with other joints than that of this session "
-            f"({', '.join(other[:3])}). Give the dance that was shown."
-        )
-
-
 def _repetitions(dance: Dance, body: Body, known: MovementEvidence, noise: Noise) -> tuple[Repetition, ...]:
     """Return the moves that gain most beside what is ``known``, best first; none to another place of the feet."""
     some = {
-        phase: _once(dance, body, phase.start, phase.end, noise)
+        phase: _once(dance, body, phase, noise)
         for phase in dance.phases
         if phase.kind == "move"
         and np.array_equal(dance.stances[phase.posture - 1].ankle, dance.stances[phase.posture].ankle)
@@ -362,11 +356,10 @@ def _repetitions(dance: Dance, body: Body, known: MovementEvidence, noise: Noise
     return tuple(out)
 
 
-def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> MovementEvidence:
-    """Return what the planned movement between two instants tells, at the rate of the judgement."""
-    time = np.arange(max(2, round((end - start) * JUDGED_RATE)) + 1) / JUDGED_RATE
-    phase = next(phase for phase in dance.phases if phase.start == start)
-    state = dance.state(phase, np.minimum(start + time, end))
+def _once(dance: Dance, body: Body, phase: Phase, noise: Noise) -> MovementEvidence:
+    """Return what the planned movement of one phase tells, at the rate of the judgement."""
+    time = np.arange(max(2, round((phase.end - phase.start) * JUDGED_RATE)) + 1) / JUDGED_RATE
+    state = dance.state(phase, np.minimum(phase.start + time, phase.end))
     motion = dance.chain.motion(time, state.x, state.v, state.a)
     return movement_evidence(body, _in_joints_of(body, dance, motion), noise=noise)
 
@@ -428,11 +421,6 @@ class PostureInformation:
         flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
         return np.asarray(flat.reshape(*W.shape[:2], -1))
 
-    def standing(self, x: Array) -> Array:
-        """Return the regressor (S, 6, 10 N) of standing still in each posture (S, n)."""
-        motion = self.chain.motion(np.arange(len(x), dtype=float), x, *np.zeros((2, *x.shape)))
-        return np.asarray(regressor(self.chain.body, motion)).reshape(len(x), 6, -1)
-
     def of_ways(self, ends: Array) -> Array:
         """Return the rows (G, m, k) of going straight from one posture to another, ``ends`` (G, 2, n)."""
         # The splines are linear in the ends.
@@ -441,7 +429,9 @@ class PostureInformation:
         return self.white(np.asarray(W).reshape(len(ends), -1, W.shape[-1]))
 
     def of_posture(self, x: Array, standing: Array) -> Array:
-        """Return the rows (m, k) of a posture ``x`` (n,) whose regressor ``standing`` (6, 10 N) is known."""
+        """Return the rows (m, k) of a posture ``x`` (n,) whose regressor ``standing`` (6, 10 N) is known
+        (`standing_regressors`).
+        """
         still = self.white(standing[None])[0]
         return np.concatenate([still, rows_of_centres(self.chain, x, still.shape[1])]) if self.centres else still
 
@@ -449,6 +439,12 @@ class PostureInformation:
         """Return by how much each of ``rows`` (..., m, k) lowers the weighted variance that a posterior leaves."""
         # tr(scale Z'Z scale').
         return np.asarray(np.sum((learned(posterior, rows) @ self.scale.T) ** 2, axis=(-2, -1)))
+
+
+def standing_regressors(chain: Chain, x: Array) -> Array:
+    """Return the regressor (S, 6, 10 N) of standing still in each posture (S, n)."""
+    motion = chain.motion(np.arange(len(x), dtype=float), x, *np.zeros((2, *x.shape)))
+    return np.asarray(regressor(chain.body, motion)).reshape(len(x), 6, -1)
 
 
 def learned(posterior: Array, rows: Array) -> Array:

@@ -16,14 +16,17 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
-from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit
+from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit, Margin
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import path_in, phase_at
-from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
 
 _RATE, _PLAN_RATE = 5.0, 25.0  # Hz at which performances are judged, and the plan is laid out
+_TRACKING, _PELVIS = float(np.radians(7.0)), 0.4
+"""rad root mean square of a restless performer's error in every joint, and the share of it in turns of the pelvis."""
+_PACE, _TIMING, _SWAYS = 1.2, 0.2, 0.006
+"""Times the planned duration; root mean square of the tempo's wandering, and m of that of the centre of pressure."""
 _WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5  # Hz: how fast errors, tempo and sway change
 _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
@@ -32,33 +35,6 @@ _FELT = 3.0
 """s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
 _ROUNDS = 2  # Corrections of the pelvis; what is left is a tenth of a millimetre a degree
 _CARRIED = 0.85  # m that the centre of mass goes when the pelvis goes 1 m over planted feet
-
-
-@dataclass(frozen=True)
-class Imprecision:
-    """How badly people copy: ``tracking`` rad root mean square of every joint's error, ``pelvis`` the share of it that
-    the pelvis' turns have, ``pace`` times the planned duration, ``timing`` root mean square of the tempo's wandering,
-    ``sway`` m root mean square of the centre of pressure. The usual values are those of a restless performer.
-    """
-
-    tracking: float = float(np.radians(7.0))
-    pelvis: float = 0.4
-    pace: float = 1.2
-    timing: float = 0.2
-    sway: float = 0.006
-
-
-USUAL_IMPRECISION = Imprecision()
-
-
-def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
-    """Return instants (T,) s of a performance, and those of the plan (T,) s that belong to them."""
-    time = np.arange(round(duration * how.pace * _RATE) + 1) / _RATE
-    # Lognormal: the tempo is never negative.
-    tempo = np.exp(how.timing * _noise(rng, time, 1, _TEMPO)[:, 0])
-    # Trapezoidal rule: how much is done by every instant, in any unit.
-    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
-    return time, duration * done / done[-1]
 
 
 def _noise(
@@ -112,7 +88,7 @@ class PlannedDance:
         counts = [max(2, round((phase.end - phase.start) * _PLAN_RATE)) for phase in near]
         spread = [np.linspace(p.start, p.end, n, endpoint=False) for p, n in zip(near, counts, strict=True)]
         time: Array = np.unique(np.round(np.concatenate(spread), 9))
-        rows, parts = self.phase_at(time), list[Array]()
+        rows, parts = phase_at(phases, time), list[Array]()
         for p in np.unique(rows):
             x = path_in(phases[p], dance.postures, dance.via, time[rows == p])[0]
             parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))  # they hold their feet
@@ -121,10 +97,6 @@ class PlannedDance:
         # What the plan keeps below (or above) straight legs; performers keep it, too.
         over = x[:, 2] - self._tops(x, up, ankle)
         self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
-
-    def phase_at(self, when: Array) -> NDArray[np.intp]:
-        """Return the phase (T,) at instants of the plan."""
-        return phase_at(self.dance.phases, when)
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
@@ -141,60 +113,39 @@ class PlannedDance:
         # Soft minimum of both: -log(sum of exp(-k h)) / k, without a kink where the leg changes.
         return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
 
-    def performed_by(
-        self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
-    ) -> ImpreciseCopy:
-        """Return the performances of several people, one behind the other: of each the random numbers, instants s (T,)
-        and those s (T,) of the plan that belong to them, and which of them count. The first and the last two frames of
-        each have differences to somebody else's.
-        """
-        parts = list[tuple[Array, Array, Array, Array]]()
-        for rng, time, when, part in people:
-            error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
-            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=0.1, part=part)
-            parts.append((time[part], when[part], error, sway))
-        times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
-        return self._copied(times, places, errors, sways, how)
-
     def held_by(self, when: Array) -> ImpreciseCopy:
-        """Return what people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the plan: the
-        same `_DRAWN` at every one, instant by instant.
+        """Return what imprecise people do who stop at each of the instants ``when`` (W,) s of the plan: the same
+        `_DRAWN` at every one, instant by instant.
         """
-        how, rng = USUAL_IMPRECISION, np.random.default_rng(0)
+        rng = np.random.default_rng(0)
         # Orthogonal columns and their negatives: mean and covariance are those of the population. Independent draws
         # told the left side from the right one by chance (deviations of a mirrored posture: 3.4 and 4.4).
         half = np.linalg.qr(rng.normal(size=(_DRAWN // 2, self.chain.size - 1)))[0] * np.sqrt(_DRAWN / 2)
         drawn = np.tile(np.concatenate([half, -half]), (len(when), 1))
-        error, sway = how.tracking * drawn[:, :-2], how.sway * drawn[:, -2:]
         places = np.repeat(when, _DRAWN)
-        return replace(self._copied(np.arange(places.size, dtype=float), places, error, sway, how), still=True)
+        return replace(self.copied(np.arange(places.size, dtype=float), places, drawn), still=True)
 
-    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
-        """Return the plan at ``when``, off by ``error`` rad (T, n - 3) and ``sway`` m (T, 2)."""
-        error = error.copy()
-        for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
-            error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
-        x, rows = self._off(when, error, sway, how)
-        return ImpreciseCopy(self.chain.body, time, self.chain.positions(x), self.stances, rows)
-
-    def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
-        chain, rows = self.chain, self.phase_at(when)
-        told = self.spline(when)
-        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2], told[:, -1]
-        if self.dance.stances[0].seat:
-            x[:, ROOT:] += error[:, 3:]
-            return x, rows
-        x[:, 3:ROOT] += how.pelvis * error[:, :3]
-        x[:, ROOT:] += error[:, 3:]
-        com = com + sway
-        (up, ankle), wanted = self._feet(rows, when), x.copy()
-        for k in range(_ROUNDS + 1):
-            x[:, 2] = self._tops(x, up, ankle) + over
-            x = self._standing(x, wanted, up, ankle)
-            if k < _ROUNDS:
-                # Newton: the centre of mass goes `_CARRIED` times as far as the pelvis.
-                x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
-        return x, rows
+    def copied(self, time: Array, when: Array, drawn: Array) -> ImpreciseCopy:
+        """Return the plan at instants ``when`` (T,) s as copied at ``time`` (T,) s with ``drawn`` errors (T, n - 1) of
+        unit standard deviation: of the pelvis' turns, of all joints, of the centre of pressure.
+        """
+        error, sway = _TRACKING * drawn[:, :-2], _SWAYS * drawn[:, -2:]
+        chain, rows, told, feet = self.chain, phase_at(self.dance.phases, when), self.spline(when), self.stances[0]
+        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2] + sway, told[:, -1]
+        moved = error[:, 3:].copy()
+        for side in feet.quiet:  # the frame holds the hand where it is, or the arm hangs
+            moved[:, np.array(chain.arm_columns[side]) - ROOT] = 0.0
+        x[:, ROOT:] += moved
+        if not feet.seat:
+            x[:, 3:ROOT] += _PELVIS * error[:, :3]
+            (up, ankle), wanted = self._feet(rows, when), x.copy()
+            for k in range(_ROUNDS + 1):
+                x[:, 2] = self._tops(x, up, ankle) + over
+                x = self._standing(x, wanted, up, ankle)
+                if k < _ROUNDS:
+                    # Newton: the centre of mass goes `_CARRIED` times as far as the pelvis.
+                    x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
+        return ImpreciseCopy(chain.body, time, chain.positions(x), self.stances, rows)
 
     def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
         """Return x (T, n) with legs that hold their feet, as far as these are not up; then they do as ``wanted``."""
@@ -252,7 +203,6 @@ def try_performers(
     *,
     who: Sequence[int] = range(PERFORMER_COUNT),
     only: tuple[int, ...] = (),
-    how: Imprecision = USUAL_IMPRECISION,
     workers: Executor | None = None,
 ) -> PerformersResult:
     """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
@@ -260,11 +210,11 @@ def try_performers(
     of them look at half of the performers each.
     """
     if workers is None:
-        parts = [_rooms(dance, limits, who, only, how)]
+        parts = [_rooms(dance, limits, who, only)]
     else:
         half = (len(who) + 1) // 2
         halves = [some for some in (who[:half], who[half:]) if some]
-        tasks = [workers.submit(_rooms, dance, limits, some, only, how) for some in halves]
+        tasks = [workers.submit(_rooms, dance, limits, some, only) for some in halves]
         parts = [task.result() for task in tasks]
     margins, bad, failed = list[Margin](), set[tuple[int, str]](), set[int]()
     starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
@@ -282,15 +232,27 @@ def try_performers(
 
 @one_thread()
 def _rooms(
-    dance: Dance, limits: tuple[Limit, ...], who: Sequence[int], only: tuple[int, ...], how: Imprecision
+    dance: Dance, limits: tuple[Limit, ...], who: Sequence[int], only: tuple[int, ...]
 ) -> dict[str, tuple[Array, list[str]]]:
     """Return the least that each performer leaves of every limit by posture (K, P), and where (K)."""
-    people, asked = [_person(dance, k, only, how) for k in who], for_imprecise(limits)
+    people, asked = [_person(dance, k, only) for k in who], for_imprecise(limits)
     when = np.concatenate([when[part] for _, _, when, part in people])
     plan, room = PlannedDance(dance, (when.min(), when.max())), {limit.name: list[Array]() for limit in asked}
     what = {limit.name: list[str]() for limit in asked}
     for some in _groups(people):
-        copy, end = plan.performed_by(some, how), np.cumsum([when[part].size for _, _, when, part in some])
+        parts = [
+            (
+                time[part],
+                when[part],
+                _noise(rng, time, plan.chain.size - 3, _WANDER, part=part),
+                _noise(rng, time, 2, _SWAY, slow=0.1, part=part),
+            )
+            for rng, time, when, part in some
+        ]
+        times, places, error, sway = (np.concatenate(one) for one in zip(*parts, strict=True))
+        # One performance behind the other: the first and the last two frames of each have differences to another's.
+        copy = plan.copied(times, places, np.hstack([error, sway]))
+        end = np.cumsum([when[part].size for _, _, when, part in some])
         posture = plan.posture[copy.on]
         for limit, one in asked.items():
             left = one.left(copy)
@@ -309,10 +271,14 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 """What a performer's errors are drawn from, instants s of the performance and of the plan, and which of them count."""
 
 
-def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _Person:
+def _person(dance: Dance, k: int, only: tuple[int, ...]) -> _Person:
     """Return performer ``k``, and the instants of the dance to or in the postures ``only``."""
-    time, when = draw_clock(np.random.default_rng([0, 7, k]), dance.duration, how)
-    part = slice(None)
+    time, part = np.arange(round(dance.duration * _PACE * _RATE) + 1) / _RATE, slice(None)
+    # Lognormal: the tempo is never negative.
+    tempo = np.exp(_TIMING * _noise(np.random.default_rng([0, 7, k]), time, 1, _TEMPO)[:, 0])
+    # Trapezoidal rule: how much is done by every instant, in any unit.
+    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
+    when = dance.duration * done / done[-1]
     if only:
         posture = np.array([phase.posture for phase in dance.phases])[phase_at(dance.phases, when)]
         inside = np.flatnonzero(np.isin(posture, only))
@@ -333,7 +299,7 @@ def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -
     demanded there. Deviations are those towards the limit: an arm beside the head errs farther towards it than away.
     """
     plan = PlannedDance(dance)
-    when = when[~plan.stepping[plan.phase_at(when)]]
+    when = when[~plan.stepping[phase_at(dance.phases, when)]]
     if not when.size:
         return np.inf, ""
     copy, found = plan.held_by(when), [(np.inf, "")]

@@ -16,6 +16,7 @@ from biodance.body.body import Body
 from biodance.body.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
+from biodance.dance.limits import Margin
 from biodance.dance.limits.balance import Balance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -24,7 +25,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.search.course import Tell
 from biodance.dance.search.move import Task, exciting_move
 from biodance.dance.search.postures import intermediate_posture
-from biodance.dance.verify import Margin, verify
+from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.limits import NOTHING, CheckedMotion, Limit
-from biodance.dance.limits import Margin as Margin
+from biodance.dance.limits import NOTHING, CheckedMotion, Limit, Margin
 from biodance.dance.problem import excitation
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import straight_via

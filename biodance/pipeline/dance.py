@@ -20,7 +20,7 @@ from biodance.dance.cues import Number, Say, as_number, in_english
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
-from biodance.dance.limits import ForImprecise, Limit, family
+from biodance.dance.limits import ForImprecise, Limit, Margin, family
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.feet import AROUND, room_on_plates
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
@@ -30,7 +30,7 @@ from biodance.dance.problem.stance import SEAT_TO_HIP
 from biodance.dance.robot import design_robot, robot_plan
 from biodance.dance.search.postures import counterpart
 from biodance.dance.search.word_course import NoNextPosture, freer_dance
-from biodance.dance.verify import DanceMetrics, Margin, broken, dance_metrics, longest_alone
+from biodance.dance.verify import DanceMetrics, broken, dance_metrics, longest_alone
 from biodance.display import cause_in_words
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import FileValue

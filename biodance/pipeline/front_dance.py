@@ -16,7 +16,7 @@ from biodance.errors import BiodanceError, SessionRefused, refuse_unknown
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import SIDES, Array, Subject
 from biodance.spatial import zero_moment_point
-from biodance.virtual_lab.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.causes import Hidden, parse_cause
 from biodance.virtual_lab.movement import STAND, Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.movement.performance import (
     ARM,
@@ -34,8 +34,7 @@ from biodance.virtual_lab.simulate import simulate_session as write_session
 from biodance.virtual_lab.visit import FIRST_VISIT, Instruments, LabVisit, draw_laboratory, perform_in
 
 if TYPE_CHECKING:
-    from biodance.dance.limits import Limit
-    from biodance.dance.verify import Margin
+    from biodance.dance.limits import Limit, Margin
     from biodance.pipeline.dance import DanceResult
     from biodance.pipeline.results import SessionResult
 
@@ -127,8 +126,7 @@ def simulate_dance(
     others = [trial for trial in read_protocol(_OTHERS).trials if trial.role in ("static", "validate") and not seated]
     shown = {one.name: one for one in (*danced, *(_on_the_stool(dance, danced) if seated else ()))}
     trials = [one.plan(round(float(np.ptp(one.motion.time)) * performer.pace, 1)) for one in shown.values()]
-    plan = Protocol(dance.protocol, "a designed dance", (*others, *trials))
-    visit, loads = hide(hidden, subject, plan, seed=seed, visit=FIRST_VISIT)
+    plan = Protocol(dance.protocol, (*others, *trials))
 
     def performed(instruments: Instruments, person: Person, trial: TrialPlan) -> Performance:
         if trial.name not in shown:
@@ -146,7 +144,7 @@ def simulate_dance(
         return replace(done, forces=instruments.visit.forces)
 
     bent = _BENT if seated else {}
-    return write_session(subject, plan, out, seed=seed, loads=loads, visit=visit, performed=performed, bent=bent)
+    return write_session(subject, plan, out, seed=seed, hidden=hidden, performed=performed, bent=bent)
 
 
 def design_dance(
@@ -341,8 +339,7 @@ def simulate(
         return simulate_dance(subject, one, Path(out), seed=seed, performer=PERFORMERS[performer], hidden=hidden)
     plan = read_protocol(protocol)
     visit = FIRST_VISIT if lab_seed is None else LabVisit(laboratory=draw_laboratory(lab_seed))
-    visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
-    return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
+    return write_session(subject, plan, Path(out), seed=seed, hidden=hidden, visit=visit)
 
 
 def virtual_subject(

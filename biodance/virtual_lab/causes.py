@@ -4,6 +4,7 @@ acts on the person beside gravity and the plates: rails, ropes, table edges, and
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.person import CARRIERS, MERGED, AddedLoad, Person, load_on, make_person, with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, stream
-from biodance.virtual_lab.recording_faults import FAULTS, Clock, axis_index, with_target
+from biodance.virtual_lab.recording_faults import FAULTS, Clock, axis_index
 from biodance.virtual_lab.visit import FIRST_VISIT, Fault, LabVisit
 
 GRIPS = {
@@ -63,14 +64,16 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     return out
 
 
-FORCES: dict[str, Callable[..., AppliedForce]] = {}
-"""Everything that pulls or pushes below, by its name."""
+FORCES: dict[str, Callable[..., Array]] = {}
+"""Everything that pulls or pushes below, by its name: (performance, time (T,) s, target, **sizes) -> wrench (T, 6)
+about the lab origin.
+"""
 
 
-def acting(act: Callable[..., Array]) -> Callable[..., AppliedForce]:
-    """Build forces from ``act`` (performance, time (T,) s, target, **sizes) -> wrench (T, 6) about the lab origin."""
-    FORCES[act.__name__] = with_target(act)
-    return FORCES[act.__name__]
+def acting(act: Callable[..., Array]) -> Callable[..., Array]:
+    """Add a force to those that are known by name."""
+    FORCES[act.__name__] = act
+    return act
 
 
 @acting
@@ -228,24 +231,8 @@ class Hidden:
         return self.values[name]
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What a cause may change: the ``visit``, and the ``loads`` of the ``person`` in the trials of ``protocol``."""
-
-    person: Person
-    protocol: Protocol
-    visit: LabVisit
-    loads: tuple[AddedLoad, ...] = ()
-
-    def on_visit(self, **changes: Any) -> "Scene":
-        """Return the scene with ``changes`` of its visit."""
-        return replace(self, visit=replace(self.visit, **changes))
-
-    def pushed(self, force: AppliedForce) -> "Scene":
-        """Return the scene with one more force on the person."""
-        return self.on_visit(forces=(*self.visit.forces, force))
-
-
+_Change = Callable[[Hidden, Person, LabVisit], LabVisit]
+"""Returns the visit with a cause in it or in the person."""
 _GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "time", "return")
 """What a builder, or the function behind it, takes beside the sizes of a cause."""
 
@@ -271,42 +258,44 @@ def _parameters(builder: Callable[..., object]) -> tuple[str, ...]:
     return tuple(name for name in builder.__annotations__ if name not in _GIVEN)
 
 
-def _load(cause: Hidden, scene: Scene) -> Scene:
+def _load(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
     """Put ``mass`` kg on one of the 12 segments, ``place`` (3) m in its joint frame (beside the CoM if not given)."""
     mass = cause.vector("mass", 1)[0]
     if set(cause.values) - {"mass", "place"} or mass <= 0:
         raise BiodanceError(f"Effect added_mass has mass (kg, > 0) and place (three numbers, m); got {cause.values}.")
     place = np.array(cause.vector("place", 3)) if "place" in cause.values else None
-    return replace(scene, loads=(*scene.loads, load_on(scene.person, cause.target, mass, place=place)))
+    return replace(visit, loads=(*visit.loads, load_on(person, cause.target, mass, place=place)))
 
 
-def _wobble(cause: Hidden, scene: Scene) -> Scene:
-    return scene.pushed(wobbling_mass(scene.person, cause.target, **cause.numbers(("mass",))))
+def _wobble(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
+    force = wobbling_mass(person, cause.target, **cause.numbers(("mass",)))
+    return replace(visit, forces=(*visit.forces, force))
 
 
-def _slosh(cause: Hidden, scene: Scene) -> Scene:
-    load, force = sloshing_load(scene.person, cause.target, **cause.numbers(("mass", "sloshing")))
-    return replace(scene.pushed(force), loads=(*scene.loads, load))
+def _slosh(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
+    load, force = sloshing_load(person, cause.target, **cause.numbers(("mass", "sloshing")))
+    return replace(visit, forces=(*visit.forces, force), loads=(*visit.loads, load))
 
 
-def _tilt(cause: Hidden, scene: Scene) -> Scene:
+def _tilt(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
     """Turn the laboratory's axes by ``angle`` rad about lab x or y."""
-    turn = np.array(scene.visit.tilt)
+    turn = np.array(visit.tilt)
     turn[axis_index(cause.target)] += cause.numbers(("angle",))["angle"]
-    return scene.on_visit(tilt=tuple(turn))
+    return replace(visit, tilt=tuple(turn))
 
 
-def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidden, Scene], Scene]:
+def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> _Change:
     """Return the change that moves a joint centre or a marker by ``shift`` (3) m."""
 
-    def change(cause: Hidden, scene: Scene) -> Scene:
-        moved = {**getattr(scene.visit, field), cause.target: np.array(cause.vector("shift", 3))}
-        return scene.on_visit(**{field: moved})
+    def change(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
+        moved = {**getattr(visit, field), cause.target: np.array(cause.vector("shift", 3))}
+        changes: dict[str, Any] = {field: moved}
+        return replace(visit, **changes)
 
     return change
 
 
-def _longer(cause: Hidden, scene: Scene) -> Scene:
+def _longer(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
     """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower."""
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
@@ -315,27 +304,27 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
     }
     refuse_unknown("segment whose length can be wrong", cause.target, ends)
     shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
-    return scene.on_visit(joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})
+    return replace(visit, joint_shifts={**visit.joint_shifts, ends[cause.target]: shift})
 
 
-def _prosthesis(cause: Hidden, scene: Scene) -> Scene:
+def _prosthesis(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
     """Make the limb from a segment on ``lighter`` kg: a prosthesis."""
-    limbs = {**scene.visit.lighter_limbs, cause.target: cause.numbers(("lighter",))["lighter"]}
-    with_prostheses(scene.person, limbs)  # refused here, before anything is simulated
-    return scene.on_visit(lighter_limbs=limbs)
+    limbs = {**visit.lighter_limbs, cause.target: cause.numbers(("lighter",))["lighter"]}
+    with_prostheses(person, limbs)  # refused here, before anything is simulated
+    return replace(visit, lighter_limbs=limbs)
 
 
-def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
+def _motion(tolerance: str) -> _Change:
     """Return the change that lets the person move a joint that the model lacks by ``angle`` rad rms per axis."""
 
-    def change(cause: Hidden, scene: Scene) -> Scene:
+    def change(cause: Hidden, person: Person, visit: LabVisit) -> LabVisit:
         angle = cause.numbers(("angle",))["angle"]
-        return scene.on_visit(tolerances=replace(scene.visit.tolerances, **{tolerance: angle}))
+        return replace(visit, tolerances=replace(visit.tolerances, **{tolerance: angle}))
 
     return change
 
 
-IN_THE_PERSON: dict[str, Callable[[Hidden, Scene], Scene]] = {
+IN_THE_PERSON: dict[str, _Change] = {
     "added_mass": _load,
     "wobbling_mass": _wobble,
     "sloshing_load": _slosh,
@@ -350,32 +339,6 @@ IN_THE_PERSON: dict[str, Callable[[Hidden, Scene], Scene]] = {
 }
 CAUSES = (*FAULTS, *FORCES, *IN_THE_PERSON)
 _KIND = "effect that the virtual laboratory can make"
-
-
-def conceal(cause: Hidden, scene: Scene) -> Scene:
-    """Return the scene with one more cause in it.
-
-    Raises
-    ------
-    UnknownName
-        There is no such cause, or its target does not exist.
-    BiodanceError
-        A parameter is missing, has a wrong name or an impossible value.
-    """
-    if cause.name in IN_THE_PERSON:
-        return IN_THE_PERSON[cause.name](cause, scene)
-    if cause.name in FORCES:
-        builder = FORCES[cause.name]
-        return scene.pushed(builder(cause.target, **cause.numbers(_parameters(builder))))
-    refuse_unknown(_KIND, cause.name, CAUSES)
-    ends = np.cumsum([trial.duration for trial in scene.protocol.trials])
-    starts = ends - [trial.duration for trial in scene.protocol.trials]
-    # Share of the session's time.
-    clock = {
-        trial.name: (float(start / ends[-1]), float(end / ends[-1]))
-        for trial, start, end in zip(scene.protocol.trials, starts, ends, strict=True)
-    }
-    return scene.on_visit(faults=(*scene.visit.faults, fault_of(cause, clock)))
 
 
 def parse_cause(text: str) -> Hidden:
@@ -413,17 +376,31 @@ def parse_cause(text: str) -> Hidden:
 
 def hide(
     hidden: tuple[Hidden, ...], subject: Subject, protocol: Protocol, *, seed: int, visit: LabVisit = FIRST_VISIT
-) -> tuple[LabVisit, tuple[AddedLoad, ...]]:
-    """Return the visit with the causes, and the loads that the person carries.
+) -> LabVisit:
+    """Return the visit with the causes.
 
     Raises
     ------
     UnknownName
         A cause, target or channel does not exist.
     BiodanceError
-        A parameter is missing, or a mass is not positive.
+        A parameter is missing or has a wrong name, or a mass is not positive.
     """
-    scene = Scene(make_person(subject, seed, tolerances=visit.tolerances, session=visit.number), protocol, visit)
+    person = make_person(subject, seed, tolerances=visit.tolerances, session=visit.number)
+    ends = np.cumsum([trial.duration for trial in protocol.trials])
+    # Share of the session's time.
+    clock = {
+        trial.name: (float((end - trial.duration) / ends[-1]), float(end / ends[-1]))
+        for trial, end in zip(protocol.trials, ends, strict=True)
+    }
     for cause in hidden:
-        scene = conceal(cause, scene)
-    return scene.visit, scene.loads
+        refuse_unknown(_KIND, cause.name, CAUSES)
+        if cause.name in IN_THE_PERSON:
+            visit = IN_THE_PERSON[cause.name](cause, person, visit)
+        elif cause.name in FORCES:
+            act = FORCES[cause.name]
+            force = partial(act, target=cause.target, **cause.numbers(_parameters(act)))
+            visit = replace(visit, forces=(*visit.forces, force))
+        else:
+            visit = replace(visit, faults=(*visit.faults, fault_of(cause, clock)))
+    return visit

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.parts import GRAVITY, SegmentMarkers
+from biodance.body.parts import GRAVITY
 from biodance.lab.c3d.write import PlateRecording
-from biodance.motion.kinematics import Poses, poses
+from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.person import Person, reference_angles, skeleton
@@ -85,37 +85,6 @@ def draw_soft_tissue(person: Person, session: int, tolerances: skeleton.LabToler
     return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
 
 
-def skin_displacement(
-    tissue: SoftTissue,
-    person: Person,
-    poses: Poses,
-    angles: Array,
-    acceleration: Array,
-    time: Array,
-    rng: np.random.Generator,
-) -> Array:
-    """Return the displacement (T, K, 3) m of the markers against the bone, lab frame.
-
-    ``poses`` of the true body, ``angles`` (T, 39) rad, ``acceleration`` (T, K, 3) m/s² of the marker places fixed to
-    the bone, at ``time`` (T,) s.
-    """
-    markers: SegmentMarkers = person.body.markers
-    turn = poses.rotation[:, list(markers.segment)]
-    # Sum over joints of angle times pull: linear in the angles.
-    local = np.einsum("tj,jki->tki", angles - reference_angles(person), tissue.pull)
-    if tissue.wave[0].any():
-        size, frequency, phase = tissue.wave
-        local += size * np.sin(frequency * time[:, None, None] + phase)
-    # R'(g - a): what a spring on the bone feels.
-    specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
-    # Less what it felt upright when the markers were glued: gravity along -y of every segment.
-    local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
-    if np.any(tissue.sag):
-        drift = skeleton.smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
-        local += 0.0005 * drift.reshape(time.size, len(markers.names), 3)  # m rms per axis
-    return np.einsum("tkij,tkj->tki", turn, local)
-
-
 def film(
     performance: Performance,
     tissue: SoftTissue,
@@ -136,7 +105,20 @@ def film(
     pose, markers = poses(person.body, motion.q), person.body.markers
     bone = pose.points(markers.segment, np.array(markers.position))
     acceleration = make_interp_spline(time, bone, k=5).derivative(2)(time)
-    xyz = (bone + skin_displacement(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)) @ tilt.T
+    turn = pose.rotation[:, list(markers.segment)]
+    # Sum over joints of angle times pull: linear in the angles.
+    skin = np.einsum("tj,jki->tki", motion.q[:, 7:] - reference_angles(person), tissue.pull)
+    if tissue.wave[0].any():
+        size, frequency, phase = tissue.wave
+        skin += size * np.sin(frequency * time[:, None, None] + phase)
+    # R'(g - a): what a spring on the bone feels.
+    specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
+    # Less what it felt upright when the markers were glued: gravity along -y of every segment.
+    skin += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
+    if np.any(tissue.sag):
+        drift = skeleton.smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
+        skin += 0.0005 * drift.reshape(skin.shape)  # m rms per axis
+    xyz = (bone + np.einsum("tkij,tkj->tki", turn, skin)) @ tilt.T
     wander = skeleton.smooth_noise(rng, time, columns=3 * xyz.shape[1], cutoff=0.6).reshape(xyz.shape)
     xyz = xyz + tolerances.camera_wander * wander + tolerances.camera_noise * rng.normal(size=xyz.shape)
     if performance.plan.role != "static":

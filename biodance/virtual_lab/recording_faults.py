@@ -60,19 +60,14 @@ def made_here(build: Builder) -> Builder:
     return build
 
 
-def with_target(act: Callable[..., Any]) -> Callable[..., Any]:
-    """Return of ``act`` (what it acts on, target, **sizes) the function of target and sizes that returns the rest."""
-
-    @wraps(act)
-    def build(target: str, **sizes: float) -> Callable[..., Any]:
-        return partial(act, target=target, **sizes)
-
-    return build
-
-
 def on_recording(change: Callable[..., Recording]) -> Builder:
     """Build faults of a whole recording from ``change`` (recording, target, **sizes) -> Recording."""
-    return made_here(with_target(change))
+
+    @wraps(change)
+    def build(target: str, **sizes: Any) -> Fault:
+        return partial(change, target=target, **sizes)
+
+    return made_here(build)
 
 
 def on_plate(change: Callable[..., Array]) -> Builder:

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
+from biodance.lab.c3d.write import write_c3d
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Array, Sip, Subject
 from biodance.threads import one_thread
 from biodance.version import __version__
-from biodance.virtual_lab.causes import wobbling_mass
+from biodance.virtual_lab.causes import Hidden, hide, wobbling_mass
 from biodance.virtual_lab.movement import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.person import (
@@ -46,7 +47,6 @@ from biodance.virtual_lab.visit import (
     scale_reading,
     set_up,
     soft_parts,
-    write,
 )
 
 TRUTH = "truth"
@@ -61,26 +61,28 @@ def simulate_session(
     out: Path,
     *,
     seed: int,
-    loads: tuple[AddedLoad, ...] = (),
+    hidden: tuple[Hidden, ...] = (),
     visit: LabVisit = FIRST_VISIT,
     performed: Callable[[Instruments, Person, TrialPlan], Performance] = perform_in,
     bent: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
-    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``.
-    ``loads`` are carried on top of the subject's mass. Every trial is ``performed``; markers were glued on somebody
-    with joints ``bent`` by so many rad. The same arguments write the same bytes.
+    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``, with
+    the causes ``hidden`` in it (`hide`). Every trial is ``performed``; markers were glued on somebody with joints
+    ``bent`` by so many rad. The same arguments write the same bytes.
 
     Raises
     ------
     BiodanceError
-        The folder is not empty, or the subject is outside the range that the virtual body covers.
+        The folder is not empty, the subject is outside the range that the virtual body covers, or a hidden cause lacks
+        a parameter.
     UnknownName
-        There is no such protocol.
+        There is no such protocol, or no such cause or target.
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
     check_simulated(subject)
+    visit = hide(hidden, subject, plan, seed=seed, visit=visit)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
     if plan.belts:
@@ -89,7 +91,7 @@ def simulate_session(
         subject,
         seed,
         tolerances=visit.tolerances,
-        loads=loads,
+        loads=visit.loads,
         session=visit.number,
         joint_shifts=visit.joint_shifts,
         population=visit.laboratory.population,
@@ -108,7 +110,13 @@ def simulate_session(
             for fault in visit.faults:
                 recording = fault(recording)
             declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
-            write(recording, part)
+            write_c3d(
+                part / f"{recording.name}.c3d",
+                markers=recording.markers,
+                plates=recording.plates,
+                analog_rate=recording.analog_rate,
+                parameters=dict(recording.parameters),
+            )
         (part / "session.toml").write_text(session_toml(person, plan, declared, joints=visit.laboratory.joints))
         (part / TRUTH).mkdir()
         document = truth(person, plan.name, instruments, performances)

@@ -5,12 +5,11 @@ themselves, tables, skin, cameras, plates, tolerances, restlessness, ages and me
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording
 from biodance.records import Array, Markers, Role, Subject, assign, frozen_array
 from biodance.virtual_lab.instruments import (
     HALF_BELT,
@@ -27,7 +26,7 @@ from biodance.virtual_lab.instruments import (
 from biodance.virtual_lab.movement import TrialPlan
 from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
-from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.person import AddedLoad, Person
 from biodance.virtual_lab.person.skeleton import MARKER_RADIUS, REALISTIC, LabTolerances, small_rotation, stream
 
 CAMERAS = (1.0e-5, 3.0e-4)
@@ -218,7 +217,8 @@ class LabVisit:
     ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
     person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
     parent's frame, with all that hangs on them; ``marker_shifts`` (3,) m by label move markers on their segments after
-    the static trial; ``lighter_limbs`` kg by the first segment that a prosthesis replaces.
+    the static trial; ``lighter_limbs`` kg by the first segment that a prosthesis replaces; ``loads`` are carried on top
+    of the subject's mass.
     """
 
     number: int = 0
@@ -230,6 +230,7 @@ class LabVisit:
     joint_shifts: Mapping[str, Array] = field(default_factory=dict)
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
     lighter_limbs: Mapping[str, float] = field(default_factory=dict)
+    loads: tuple[AddedLoad, ...] = ()
 
     def __post_init__(self) -> None:
         assign(self, tolerances=self.tolerances or self.laboratory.tolerances)
@@ -347,10 +348,3 @@ def scale_reading(person: Person, session: int, tolerances: LabTolerances) -> fl
     """Return the body mass kg that the scale showed, in steps of 0.1 kg, without loads."""
     error = tolerances.scale * stream(person.seed, "scale", str(session)).normal()
     return round(person.subject.mass + error, 1) if tolerances.scale else person.subject.mass
-
-
-def write(recording: Recording, folder: Path) -> Path:
-    """Write one recording as ``folder/NAME.c3d`` and return the path; an existing file is never overwritten."""
-    path, groups, rate = folder / f"{recording.name}.c3d", dict(recording.parameters), recording.analog_rate
-    write_c3d(path, markers=recording.markers, plates=recording.plates, analog_rate=rate, parameters=groups)
-    return path

@@ -21,15 +21,28 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import GRAVITY, rigid_inertia
-from biodance.dance.problem.stance import Stance, support_depth
-from biodance.dance.problem.state import FAR as FAR
-from biodance.dance.problem.state import Margins as Margins
+from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
 from biodance.errors import BiodanceError, refuse_unknown
 from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Motion, Wrench, assign
+
+FAR = 2.0
+"""Scales from its limit beyond which the slopes of a margin do not count."""
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
+    far as needed.
+
+    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
+    """
+
+    value: Array
+    slopes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,12 +150,6 @@ class ImpreciseCopy:
         force = (sip.mass[:, None] * pull).sum(axis=1)
         # Where the moment has no horizontal part.
         return np.asarray(np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:])
-
-    def inside(self, share: float) -> Array:
-        """Return how far (T,) m the zero-moment point lies inside the base of support of all feet on the ground, drawn
-        together to ``share``.
-        """
-        return support_depth(self.stances, self.on, self.zero_moment_point, share)
 
 
 @dataclass(frozen=True)
@@ -256,11 +263,6 @@ class Limit(ABC):
     def support_share(self) -> float:
         """Share of every half width of the base of support that this limit leaves; stances are laid out for it."""
         return 1.0
-
-
-def repeated(rows: Array, frames: int) -> Array:
-    """Return constant slopes (m, n) for every sample, (1, T, m, n)."""
-    return np.broadcast_to(rows, (1, frames, *rows.shape))
 
 
 def unconcerned(state: State) -> Margins:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.dance.limits import CheckedMotion, ForImprecise, ImpreciseCopy, Limit, Margins, Remaining, bounded
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Stance, support_depth
 from biodance.dance.problem.state import State
 from biodance.records import Array
 
@@ -58,7 +58,8 @@ def _left(copy: ImpreciseCopy) -> Remaining:
     """Return the distance (T, kinds of stance) m inside the whole support, infinite where another stance is taken."""
     names = tuple(dict.fromkeys(copy.stances[k].name for k in np.unique(copy.on)))
     taken = np.array([stance.name for stance in copy.stances])[copy.on]
-    return Remaining(np.where(taken[:, None] == np.array(names), copy.inside(1.0)[:, None], np.inf), names)
+    inside = support_depth(copy.stances, copy.on, copy.zero_moment_point)
+    return Remaining(np.where(taken[:, None] == np.array(names), inside[:, None], np.inf), names)
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, repeated
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.state import State
 
@@ -22,7 +22,8 @@ class JointRange(Limit):
         rows = np.eye(state.chain.size)[ROOT:]
         value = np.concatenate([angle - limits.lower, limits.upper - angle], axis=1) - np.radians(self.keep)
         # Constant slopes: the angle is a coordinate itself.
-        return Margins(value, repeated(np.concatenate([rows, -rows]), len(angle)))
+        slopes = np.broadcast_to(np.concatenate([rows, -rows]), (1, len(angle), 2 * len(rows), state.chain.size))
+        return Margins(value, slopes)
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distance to the nearer stop, (T, joints) rad."""

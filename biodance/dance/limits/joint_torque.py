@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.state import State
+from biodance.records import Array
 
 
 @dataclass(frozen=True)
@@ -20,18 +21,12 @@ class JointTorque(Limit):
         """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot
         of two, (T, 4 joints): as the feet share the load, and as that one bears all of it.
         """
-        parts = [self._of(state)] + ([self._of(state.alone)] if state.stance.over is not None else [])
-        return Margins(
-            np.concatenate([part.value for part in parts], axis=1),
-            np.concatenate([part.slopes for part in parts], axis=2),
-        )
-
-    def _of(self, state: State) -> Margins:
-        limits, torque = state.chain.body.limits, state.torque
-        value = np.concatenate(
-            [torque - self.share * limits.torque_lower, self.share * limits.torque_upper - torque], axis=1
-        )
-        return Margins(value, np.concatenate([state.torque_slopes, -state.torque_slopes], axis=2))
+        limits, value, slopes = state.chain.body.limits, list[Array](), list[Array]()
+        low, high = self.share * limits.torque_lower, self.share * limits.torque_upper
+        for one in (state, *([state.alone] if state.stance.over is not None else [])):
+            value += [one.torque - low, high - one.torque]
+            slopes += [one.torque_slopes, -one.torque_slopes]
+        return Margins(np.concatenate(value, axis=1), np.concatenate(slopes, axis=2))
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distance to the nearer torque limit, (T, joints) N m, whichever feet bear the load."""

@@ -234,34 +234,18 @@ def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
     solids = Solids.of(body)
     limbs = list(zip(solids.first, solids.second, strict=True))
     boxes = list(zip(solids.limb, solids.box, strict=True))
-    out = np.stack(
-        [
-            *(_limbs_at_least(solids, pose, *pair) for pair in limbs),
-            *(_box_at_least(body, solids, pose, *pair) for pair in boxes),
-        ],
-        axis=1,
-    )
+    # Points on the axes, and half of what is between neighbours: no point of an axis is farther from one of them.
+    points = [points_on_axis(pose, i, ends, _POINTS) for i, ends in enumerate(solids.axis)]
+    between = [float(np.linalg.norm(b - a)) / (_POINTS - 1) / 2 for a, b in solids.axis]
+    apart = [points_apart(points[i], points[j]) - between[i] - between[j] for i, j in limbs]
+    apart = [one - solids.radius[i] - solids.radius[j] for one, (i, j) in zip(apart, limbs, strict=True)]
+    apart += [points_off_box(body, pose, points[i], j) - between[i] - solids.radius[i] for i, j in boxes]
+    out = np.stack(apart, axis=1)
     shapes = _Shapes(body, solids)
     for t, k in zip(*np.nonzero(out < _ENOUGH), strict=True):
         i, j = (limbs + boxes)[k]
         out[t, k] = shapes.distance(pose, t, i, j, box=k >= len(limbs))
     return out, [f"{body.segments[i]} - {body.segments[j]}" for i, j in limbs + boxes]
-
-
-def _axis(solids: Solids, pose: Poses, segment: int) -> tuple[Array, float]:
-    """Return points (T, K, 3) m on the axis of a capsule and half the distance m between neighbours."""
-    a, b = ends = solids.axis[segment]
-    return points_on_axis(pose, segment, ends, _POINTS), float(np.linalg.norm(b - a)) / (_POINTS - 1) / 2
-
-
-def _limbs_at_least(solids: Solids, pose: Poses, i: int, j: int) -> Array:
-    (a, near), (b, far) = _axis(solids, pose, i), _axis(solids, pose, j)
-    return np.asarray(points_apart(a, b) - near - far - solids.radius[i] - solids.radius[j])
-
-
-def _box_at_least(body: Body, solids: Solids, pose: Poses, limb: int, box: int) -> Array:
-    points, near = _axis(solids, pose, limb)
-    return np.asarray(points_off_box(body, pose, points, box) - near - solids.radius[limb])
 
 
 class _Shapes:

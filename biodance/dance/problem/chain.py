@@ -91,11 +91,6 @@ class Chain(Sendable):
         return table
 
     @cached_property
-    def axes(self) -> Array:
-        """(n, 3) axis of each rotating coordinate in its link's frame; zero for the three slides."""
-        return np.concatenate([np.zeros((3, 3)), _TURNS, [joint.axis for joint in self.body.joints]])
-
-    @cached_property
     def model(self) -> Any:
         """The pinocchio model of the chain; joint id = coordinate + 1."""
         pin = load_pinocchio()

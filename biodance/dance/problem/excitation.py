@@ -226,47 +226,30 @@ def effort(state: State) -> tuple[float, Array]:
 
     Planted legs are not counted: they follow from the pelvis.
     """
-    scale, slopes = _Scale.of(state.chain.body), np.zeros((3, *state.x.shape))
-    planted = [c - ROOT for side in state.stance.planted for c in state.chain.leg_columns[side]]
-    counts = np.ones(len(scale.half))
-    counts[planted] = 0.0
-    angle = state.x[:, ROOT:]
-    away = (angle - scale.rest) / scale.half
-    way = np.where(angle > scale.rest, scale.upward, scale.downward)
-    near = (angle - scale.rest) / way
+    body, angle, slopes = state.chain.body, state.x[:, ROOT:], np.zeros((3, *state.x.shape))
+    low, high, names = body.limits.lower, body.limits.upper, [joint.name for joint in body.joints]
+    rest, half = np.clip(0.0, low, high), np.maximum((high - low) / 2, 1e-3)
+    counts = np.ones(len(names))
+    counts[[c - ROOT for side in state.stance.planted for c in state.chain.leg_columns[side]]] = 0.0
+    away = (angle - rest) / half
+    # The way to the stop on that side, at least 0.2 rad.
+    way = np.where(angle > rest, np.maximum(high - rest, 0.2), np.maximum(rest - low, 0.2))
+    near = (angle - rest) / way
     # Smooth |away|.
     root = np.sqrt(away**2 + _SOFT**2)
     value = (root - _SOFT + STOP * near**8) @ counts
     # d root / d away = away / root.
-    by = counts * (away / root / scale.half + 8 * STOP * near**7 / way)
-    for right, left in scale.pairs:
-        if counts[right] and counts[left]:
-            gap = (angle[:, right] - angle[:, left]) / scale.half[right]
+    by = counts * (away / root / half + 8 * STOP * near**7 / way)
+    for right, name in enumerate(names):
+        other = name.replace("right_", "left_", 1)
+        left = names.index(other) if other in names else right
+        if left != right and counts[right] and counts[left]:
+            gap = (angle[:, right] - angle[:, left]) / half[right]
             # The mean is over joints: a pair counts for two.
             value = value + 2 * SIDE * gap**2
-            by[:, right] += 4 * SIDE * gap / scale.half[right]
-            by[:, left] -= 4 * SIDE * gap / scale.half[right]
+            by[:, right] += 4 * SIDE * gap / half[right]
+            by[:, left] -= 4 * SIDE * gap / half[right]
     # Mean over the joints that count, and over the samples.
     share = 1.0 / (max(1.0, counts.sum()) * len(angle))
     slopes[0][:, ROOT:] = share * by
     return float(share * value.sum()), slopes
-
-
-@dataclass(frozen=True, eq=False)
-class _Scale:
-    """Angles (n,) rad: ``rest``, ``half`` of the range, ``upward`` and ``downward`` to the stops; ``pairs``."""
-
-    rest: Array
-    half: Array
-    upward: Array
-    downward: Array
-    pairs: tuple[tuple[int, int], ...]
-
-    @classmethod
-    def of(cls, body: Body) -> "_Scale":
-        low, high = body.limits.lower, body.limits.upper
-        names, rest = [joint.name for joint in body.joints], np.clip(0.0, low, high)
-        others = [name.replace("right_", "left_", 1) for name in names]
-        pairs = [(j, names.index(other)) for j, other in enumerate(others) if other != names[j] and other in names]
-        upward, downward = np.maximum(high - rest, 0.2), np.maximum(rest - low, 0.2)
-        return cls(rest, np.maximum((high - low) / 2, 1e-3), upward, downward, tuple(pairs))

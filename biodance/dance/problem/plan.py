@@ -55,7 +55,7 @@ import numpy as np
 
 from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import FEET, Stance
 from biodance.errors import BiodanceError, refuse_unknown
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
@@ -91,8 +91,6 @@ def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[st
     return value
 
 
-_STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
-"""Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
 LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
 """Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
 LEAST_REST = 10.0
@@ -103,7 +101,7 @@ LEAST_REST = 10.0
 class Plan:
     """A protocol of a dance.
 
-    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most
+    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of `FEET` at most
     once; ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right
     foot stands in front; ``limits`` that all of it keeps, with their numbers; ``budget`` s: from the postures found,
     those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
@@ -121,7 +119,6 @@ class Plan:
     """
 
     name: str
-    description: str
     blocks: tuple[tuple[str, int], ...]
     move: float = 2.0
     hold: float = 5.0
@@ -152,16 +149,13 @@ class Plan:
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
         for name in names:
-            refuse_unknown("stance", name, _STANCES)
+            refuse_unknown("stance", name, FEET)
         if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
             raise BiodanceError(
                 f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or "
                 f"more."
             )
         refuse_unknown(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
-        self._check()
-
-    def _check(self) -> None:
         for name, low, high, unit in (
             ("move", 0.5 * self.slower, 20.0 * self.slower, "s"),
             ("hold", 0.0, 60.0 * self.slower, "s"),
@@ -233,14 +227,14 @@ _NUMBERS = {
     "patient_cards": "cards",
 }
 """Key of the file: field of the Plan."""
-_SHORT = {"share_of_support": ("balance", "share")}  # Key of the file: limit and its number
+_SHARE = "share_of_support"  # Short for the ``share`` of ``[limits.balance]``
 _FLAGS = ("free", "gentle", "deep", "lively")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
 FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
 _WORDS = ("name", "description", "postures", "limits", "weights", "ranges", "for", "plate_m", "care")
-_KEYS = (*_WORDS, *_NUMBERS, *_SHORT, *_FLAGS)
+_KEYS = (*_WORDS, *_NUMBERS, _SHARE, *_FLAGS)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
@@ -279,12 +273,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
     weights = {
         name: finite_number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()
     }
-    plan = Plan(
-        str(raw.get("name", path.stem)),
-        str(raw.get("description", "")),
-        tuple(counts.items()),
-        weights=tuple(weights.items()),
-    )
+    plan = Plan(str(raw.get("name", path.stem)), tuple(counts.items()), weights=tuple(weights.items()))
     return replace(plan, limits=_limits(path, raw, {} if free else {"balance": {"share": FOLLOWABLE_SHARE}}), **fields)
 
 
@@ -307,9 +296,8 @@ def _limits(path: Path, raw: dict[str, Any], usual: dict[str, dict[str, float]])
         }
         for name in given
     }
-    for short, (name, key) in _SHORT.items():
-        if short in raw and key in given.get(name, {}):
-            raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
-        if short in raw:
-            found.setdefault(name, {})[key] = finite_number(path, short, raw[short])
+    if _SHARE in raw:
+        if "share" in given.get("balance", {}):
+            raise BiodanceError(f"{path}: {_SHARE} and limits.balance.share say the same; keep one of them.")
+        found.setdefault("balance", {})["share"] = finite_number(path, _SHARE, raw[_SHARE])
     return limits_with(found, where=str(path))

@@ -13,35 +13,25 @@ from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array
 
 BOXES = ("pelvis", "trunk_head")
-_KINDS = {
-    *(("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "thigh"), ("forearm_hand", "forearm_hand")),  # the paper's
-    *(
-        ("forearm_hand", "shank"),
-        ("forearm_hand", "upper_arm"),
-        ("shank", "shank"),
-        ("foot", "foot"),
-        ("upper_arm", "thigh"),
-    ),
-    *(("shank", "thigh"), ("forearm_hand", "foot")),
-}
+_KINDS = (
+    *("foot shank", "foot thigh", "forearm_hand thigh", "forearm_hand forearm_hand"),  # the paper's
+    *("forearm_hand shank", "forearm_hand upper_arm", "shank shank", "foot foot", "thigh upper_arm"),
+    *("shank thigh", "foot forearm_hand"),
+)
+"""Limbs that must not touch, each pair in the order of the alphabet."""
+_NEIGHBOURS = ("foot shank", "foot thigh", "shank thigh", "forearm_hand upper_arm")
+"""Those of them that do on one side: there only opposite sides must not."""
 
 
 def capsule_pairs(body: Body) -> list[tuple[int, int]]:
-    """Return the pairs of limbs (segments) that must not touch: the paper's, and others that could come together."""
+    """Return the pairs of limbs (segments) that must not touch, `_KINDS`."""
+    sides = [s.split("_")[0] for s in body.segments]
     kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
-    side = [s.split("_")[0] for s in body.segments]
-    near = {
-        ("shank", "thigh"),
-        ("foot", "shank"),
-        ("foot", "thigh"),
-        ("forearm_hand", "upper_arm"),
-    }  # only the opposite side
     pairs = []
     for i, j in combinations(range(len(kinds)), 2):
-        for pair in ((kinds[i], kinds[j]), (kinds[j], kinds[i])):
-            if pair in _KINDS and not (pair in near and side[i] == side[j]):
-                pairs.append((i, j))
-                break
+        pair = " ".join(sorted([kinds[i], kinds[j]]))
+        if pair in _KINDS and not (pair in _NEIGHBOURS and sides[i] == sides[j]):
+            pairs.append((i, j))
     return pairs
 
 
@@ -59,7 +49,7 @@ def pairs_of(body: Body) -> Pairs:
     """Return the pairs of segments that must not touch: by name in a person's body (forearms against trunk and pelvis,
     limbs as `capsule_pairs`), else by the tree.
     """
-    named = {kind for pair in _KINDS for kind in pair} | set(BOXES)
+    named = {kind for pair in _KINDS for kind in pair.split()} | set(BOXES)
     if not all(segment.removeprefix("right_").removeprefix("left_") in named for segment in body.segments):
         return tree_pairs(body)
     arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]

@@ -87,23 +87,23 @@ class Stance(Sendable):
         about its middle: ``normals @ p + offsets`` is the distance inside. With the weight over one foot: of both
         feet's base and of that one's.
         """
-        if share not in self._reduced:
-            self._reduced[share] = self._edges(share)
-        return self._reduced[share]
+        if share in self._reduced:
+            return self._reduced[share]
+        if self.over is not None:
+            both, one = (self.on(*feet).reduced(share) for feet in ((0, 1), (self.over,)))
+            normals, offsets = (np.concatenate(parts) for parts in zip(both, one, strict=True))
+        else:
+            corners = self.centre + share * (self.support - self.centre)
+            along = np.roll(corners, -1, axis=0) - corners
+            # Counter-clockwise, so the inside is to the left of every edge.
+            normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+            offsets = -np.einsum("ij,ij->i", normals, corners)
+        self._reduced[share] = normals, offsets
+        return normals, offsets
 
     @cached_property
     def _reduced(self) -> dict[float, tuple[Array, Array]]:
         return {}
-
-    def _edges(self, share: float) -> tuple[Array, Array]:
-        if self.over is not None:
-            normals, offsets = zip(self.on(0, 1).reduced(share), self.on(self.over).reduced(share), strict=True)
-            return np.concatenate(normals), np.concatenate(offsets)
-        corners = self.centre + share * (self.support - self.centre)
-        along = np.roll(corners, -1, axis=0) - corners
-        # Counter-clockwise, so the inside is to the left of every edge.
-        normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
-        return normals, -np.einsum("ij,ij->i", normals, corners)
 
     @cached_property
     def key(self) -> str:
@@ -225,28 +225,29 @@ def feet_in_move(first: Stance, second: Stance) -> Stance:
     return replace(second, over=None) if np.array_equal(first.ankle, second.ankle) else second.on(1)
 
 
-_FEET = {
+FEET = {
     "parallel": "with both feet side by side",
     "right_forward": "with the right foot in front",
     "single_right": "on the right leg alone",
     "single_left": "on the left leg alone",
     "seated": "on the stool",
 }
+"""Names of stances (paper Table I, and a stool), and where the feet are, in words."""
 
 
 def stance_words(stance: Stance) -> str:
     """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
     weight = "" if stance.over is None else f", the weight on the {SIDES[stance.over]} one"
-    return _FEET[stance.name] + weight
+    return FEET[stance.name] + weight
 
 
-def support_depth(stances: Sequence[Stance], on: Index, point: Array, share: float = 1.0) -> Array:
+def support_depth(stances: Sequence[Stance], on: Index, point: Array) -> Array:
     """Return how far (T,) m each ``point`` (T, 2) lies inside the base of all planted feet of its stance
-    ``stances[on[t]]``, drawn together to ``share``; negative outside.
+    ``stances[on[t]]``; negative outside.
     """
     out = np.empty(len(point))
     for k in np.unique(on):
-        normals, offsets = stances[k].whole.reduced(share)
+        normals, offsets = stances[k].whole.reduced(1.0)
         out[on == k] = (point[on == k] @ normals.T + offsets).min(axis=1)
     return out
 

@@ -210,22 +210,6 @@ class State:
         return slopes[:, :, ROOT:]
 
 
-FAR = 2.0
-"""Scales from its limit beyond which the slopes of a margin do not count."""
-
-
-@dataclass(frozen=True, eq=False)
-class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
-    far as needed.
-
-    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
-    """
-
-    value: Array
-    slopes: Array
-
-
 def close_legs(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> State:
     """Return the state whose planted legs hold their feet still: angles, velocities and accelerations."""
     x, v, a = chain.plant(x, stance.planted, stance.ankle), v.copy(), a.copy()

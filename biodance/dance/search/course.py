@@ -3,7 +3,7 @@ the inertias, found side by side. Whatever the order of finishing, the dance is 
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from functools import cache
@@ -197,58 +197,36 @@ _KEPT = ("via", "duration", "gram", "violation", "limit", "stops")  # What a che
 def with_exciting_moves(work: DesignContext, course: Course, attempt: int = 0) -> Course:
     """Return the course with those moves found that it lacks; ``attempt`` numbers the courses of one design. A move
     that breaks a limit says so (``Move.limit``); those after it are found all the same.
+
+    Moves on the same planted feet are found one after the other, as each excites what those before it did not; of
+    other feet side by side.
     """
-    return replace(course, moves=_Chains(work, course, attempt).found())
+    moves, tasks = [*course.moves], [move_task(work, *pair) for pair in pairwise(course.steps)]
 
-
-class _Chains:
-    """The open moves in one queue for each set of planted feet, and the information of those that are found."""
-
-    def __init__(self, work: DesignContext, course: Course, attempt: int) -> None:
-        self.work, self.attempt, self.moves = work, attempt, [*course.moves]
-        self.tasks = [move_task(work, *pair) for pair in pairwise(course.steps)]
-        nothing = np.zeros((len(work.chain.body.segments), 6, 6))
-        self.queue: dict[tuple[int, ...], list[int]] = {task.stance.planted: [] for task in self.tasks}
-        self.history: dict[tuple[int, ...], Array] = dict.fromkeys(self.queue, nothing)
-        for k, (task, move) in enumerate(zip(self.tasks, self.moves, strict=True)):
-            if move is None:
-                self.queue[task.stance.planted].append(k)
-            else:
-                self.history[task.stance.planted] = self.history[task.stance.planted] + move.gram
-
-    def found(self) -> tuple[Move | None, ...]:
-        """Return all moves in the order of the course."""
-        running: dict[Future[Move], int] = {}
-        for planted in self.queue:
-            self._advance(planted, running)
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                k, move = running.pop(future), future.result()
-                self.work.checkpoint.put(self._name(k), **{one: np.array(getattr(move, one)) for one in _KEPT})
-                self._accept(k, move)
-                self._advance(self.tasks[k].stance.planted, running)
-        return tuple(self.moves)
-
-    def _advance(self, planted: tuple[int, ...], running: dict[Future[Move], int]) -> None:
-        """Take up what is kept of this chain, then submit the next of its moves."""
-        work, queue = self.work, self.queue[planted]
-        while queue:
-            k = queue[0]
-            kept = work.checkpoint.get(self._name(k))
+    def on_feet(planted: tuple[int, ...]) -> Iterator[Future[Move]]:
+        """Yield the search for one open move after the other; the next is asked for when it is done."""
+        own = [k for k, task in enumerate(tasks) if task.stance.planted == planted]
+        history = np.zeros((len(work.chain.body.segments), 6, 6))
+        for known in (moves[k] for k in own):
+            history = history if known is None else history + known.gram
+        for k in [k for k in own if moves[k] is None]:
+            name = f"move_{attempt}_{k:03d}"
+            kept = work.checkpoint.get(name)
             if kept is None:
-                seed = [work.seed, 3, k, *([self.attempt] if self.attempt else [])]
-                running[work.workers.submit(exciting_move, self.tasks[k], self.history[planted], seed)] = k
-                return
-            via, duration, gram, violation, limit, stops = (kept[name] for name in _KEPT)
-            self._accept(k, Move(via, duration, gram, float(violation), str(limit), stops))
+                seed = [work.seed, 3, k, *([attempt] if attempt else [])]
+                yield (search := work.workers.submit(exciting_move, tasks[k], history, seed))
+                move = search.result()
+                work.checkpoint.put(name, **{one: np.array(getattr(move, one)) for one in _KEPT})
+            else:
+                via, duration, gram, violation, limit, stops = (kept[one] for one in _KEPT)
+                move = Move(via, duration, gram, float(violation), str(limit), stops)
+            moves[k] = move
+            history = history if move.limit else history + move.gram
+            work.tell("moves", sum(move is not None for move in moves), len(tasks))
 
-    def _accept(self, k: int, move: Move) -> None:
-        planted = self.tasks[k].stance.planted
-        self.queue[planted].remove(k)
-        self.moves[k] = move
-        if not move.limit:
-            self.history[planted] = self.history[planted] + move.gram
-        self.work.tell("moves", sum(move is not None for move in self.moves), len(self.tasks))
-
-    def _name(self, k: int) -> str:
-        return f"move_{self.attempt}_{k:03d}"
+    running = dict[Future[Move], Iterator[Future[Move]]]()
+    going = [on_feet(planted) for planted in dict.fromkeys(task.stance.planted for task in tasks)]
+    while going:
+        running |= {search: one for one in going if (search := next(one, None)) is not None}
+        going = [running.pop(search) for search in wait(running, return_when=FIRST_COMPLETED).done]
+    return replace(course, moves=tuple(moves))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.expectation import standing_regressors
 from biodance.dance.limits import Limit
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.problem.chain import ROOT, Chain
@@ -152,13 +153,10 @@ def words_for(body: Body, plan: Plan, stance: Stance, words: Vocabulary, rng: np
     free = () if plan.gentle else free_words(rng)
     out: Vocabulary = {}
     for part, group in groups_of(stance).items():
-        if word := _quiet(stance, part):
-            out[part] = tuple(one for one in [_fitted(body, plan, part, word)] if one is not None)
-            continue
-        kept = _asked(plan, stance, (*words[group], *(free if group == "arm" else ())))
-        fitted = [
-            _fitted(body, plan, part, word) for word in kept if stance.over is None or word.rest or group == "arm"
-        ]
+        quiet = _quiet(stance, part)
+        asked = [quiet] if quiet else _asked(plan, stance, (*words[group], *(free if group == "arm" else ())))
+        kept = [word for word in asked if stance.over is None or word.rest or group == "arm"]
+        fitted = (_fitted(body, plan, part, word) for word in kept)
         out[part] = tuple(word for word in fitted if word is not None)
     return out
 
@@ -204,12 +202,10 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     """Return free postures of an arm, on a grid of angles that can be called."""
     grid = list(product(*_FREE.values()))
-    chosen = sorted(int(k) for k in rng.choice(len(grid), 8, replace=False))
     out = []
-    for number, k in enumerate(chosen, start=1):
+    for number, k in enumerate(sorted(rng.choice(len(grid), 8, replace=False)), start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
-        key = f"free_{number}"
-        out.append(Word(key, _FREE_ARM, angles, key))
+        out.append(Word(f"free_{number}", _FREE_ARM, angles, f"free_{number}"))
     return tuple(out)
 
 
@@ -332,6 +328,11 @@ class PostureTable:
         """(S,) number of the posture that does the same but for the arms, which rest."""
         still = np.where([part.endswith("_arm") for part in self.parts], 0, self.index)
         return np.ravel_multi_index(tuple(still.T), tuple(len(group) for group in self.words.values()))
+
+    @cached_property
+    def standing(self) -> Array:
+        """(S, 6, 10 N) regressors of standing still."""
+        return standing_regressors(self.chain, self.x)
 
     def words_of(self, s: int) -> dict[str, Word]:
         """Return the word of every part of posture ``s``."""

@@ -105,7 +105,8 @@ class Move:
     """A move through S >= 1 splines, by way of the ``stops`` (S - 1, n) where it rests for no time.
 
     ``via`` (S, 2, n) points, ``duration`` (S,) s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
-    over time; ``violation`` of the limits in their scales (feasible: 0) and of which ``limit``, "" if none.
+    over time; ``violation`` of the limits in their scales (feasible: 0) and of which ``limit``, "" if none; ``room``
+    by how many deviations imprecise people keep its limits, minus infinity where they were not asked.
     """
 
     via: Array
@@ -114,6 +115,7 @@ class Move:
     violation: float
     limit: str
     stops: Array
+    room: float = -np.inf
 
     @property
     def seconds(self) -> float:
@@ -283,22 +285,22 @@ _SAMPLED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _STANDING = 0.2  # s of standing still before and after a move that is looked at alone
 
 
-def straight_move(task: Task, stances: tuple[Stance, Stance], enough: float = ENOUGH) -> tuple[Move, float]:
-    """Return the move of ``task`` between postures on ``stances`` in which nothing goes out of its way that need not,
-    and by how many deviations imprecise people keep its limits (fewer than ``enough``: it has the limit of which); if
-    none keeps all limits, the one that violates least.
+def straight_move(task: Task, stances: tuple[Stance, Stance], enough: float = ENOUGH) -> Move:
+    """Return the move of ``task`` between postures on ``stances`` in which nothing goes out of its way that need not
+    (where its room is less than ``enough``: with the limit of which); if none keeps all limits, the one that violates
+    least.
     """
-    tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
+    tried, eased = list[Move](), {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
         tried.append(_safest(slow, stances, (evaluate_move(slow, via)[0] for via in _vias(slow)), enough))
-        if tried[-1][0].violation == 0 or tried[-1][0].limit not in eased:
+        if tried[-1].violation == 0 or tried[-1].limit not in eased:
             break
-    best = min(tried, key=lambda one: one[0].violation)
-    if best[0].violation == 0 or task.stance.seat:
+    best = min(tried, key=lambda move: move.violation)
+    if best.violation == 0 or task.stance.seat:
         return best
-    slow = replace(task, duration=best[0].seconds)
-    return _safest(slow, stances, [_round_about(slow, best[0])], enough)
+    slow = replace(task, duration=best.seconds)
+    return _safest(slow, stances, [_round_about(slow, best)], enough)
 
 
 def other_moves(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
@@ -338,19 +340,19 @@ def _as_balanced(task: Task, via: Array, straight: Array) -> Array:
     return via
 
 
-def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
-    """Return the first move with `AMPLE` deviations, else that with most, its limit below ``enough``, and how many."""
-    tried, best, most = list[Move](), None, -np.inf
+def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> Move:
+    """Return the first move with `AMPLE` room, else that with most, its limit below ``enough``."""
+    tried, best = list[Move](), None
     for move in moves:
         tried.append(move)
         if not move.limit:
             alone = move.dance(task, stances, np.full(2, _STANDING))
-            found, limit = deviations_of_copies(alone, task.limits, _STANDING + move.seconds * _SAMPLED)
-            if best is None or found > most:
-                best, most = replace(move, limit=limit if found < enough else ""), found
-            if found > AMPLE:
+            room, limit = deviations_of_copies(alone, task.limits, _STANDING + move.seconds * _SAMPLED)
+            if best is None or room > best.room:
+                best = replace(move, room=room, limit=limit if room < enough else "")
+            if room > AMPLE:
                 break
-    return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
+    return min(tried, key=lambda move: move.violation) if best is None else best
 
 
 def _round_about(task: Task, best: Move) -> Move:

@@ -5,13 +5,13 @@ Where a move cannot be made another posture takes the place of one of its ends, 
 only at last.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biodance.dance.expectation import PostureInformation, update_posterior
+from biodance.dance.expectation import PostureInformation, standing_regressors, update_posterior
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import static_grams
 from biodance.dance.problem.feet import support_sequence
@@ -80,7 +80,7 @@ def affordable(chain: Chain, x: Array, feet: tuple[str, ...], plan: Plan) -> lis
     other the one that, with the straight way to it from the last one on its feet (at first: from any), tells most.
     """
     information, last = PostureInformation(chain, plan), dict[str, int]()
-    still = information.white(information.standing(x))
+    still = information.white(standing_regressors(chain, x))
     posterior, picked, spent = information.beforehand, list[int](), 0.0
 
     def arriving(p: int) -> Array:
@@ -110,30 +110,32 @@ def nearest_neighbours(x: Array, groups: list[list[int]]) -> list[int]:
     scaled[:, :3] *= 3.0  # rad that a metre of the root counts
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
     out: list[int] = []
+    # One row more, of zeros: a place at no distance from anywhere.
+    apart, nowhere = np.pad(apart, ((0, 1), (0, 1))), len(x)
     for group in groups:
-        starts: list[int | None] = [None] if out else [*group]
-        before = out[-1] if out else None
-        paths = [_shortened(_greedy(apart, group, first, before), apart, before) for first in starts]
+        before = out[-1] if out else nowhere
+        starts = [_nearest(apart, before, group)] if out else group
+        paths = [_shortened(_greedy(apart, group, first), apart, before) for first in starts]
         out += min(paths, key=lambda path: float(sum(apart[a, b] for a, b in pairwise(path))))
     return out
 
 
-def _greedy(apart: Array, group: list[int], first: int | None, before: int | None) -> list[int]:
-    left = set(group)
-    path = [first if first is not None else min(sorted(left), key=lambda p: apart[before, p])]
-    left.discard(path[0])
-    while left:
-        path.append(min(sorted(left), key=lambda p: apart[path[-1], p]))
-        left.discard(path[-1])
+def _nearest(apart: Array, to: int, places: Iterable[int]) -> int:
+    return min(sorted(places), key=lambda p: float(apart[to, p]))
+
+
+def _greedy(apart: Array, group: list[int], first: int) -> list[int]:
+    path = [first]
+    while left := set(group) - set(path):
+        path.append(_nearest(apart, path[-1], left))
     return path
 
 
-def _shortened(path: list[int], apart: Array, before: int | None) -> list[int]:
-    """Return the path with stretches turned round (2-opt) until none helps; ``before`` is where it comes from."""
-    # One row more, of zeros: a place at no distance from anywhere.
-    table: NDArray[np.float64] = np.pad(apart, ((0, 1), (0, 1)))
-    nowhere = len(apart)  # at distance zero from everything
-    ends = [nowhere if before is None else before, *path, nowhere]
+def _shortened(path: list[int], table: Array, before: int) -> list[int]:
+    """Return the path with stretches turned round (2-opt) until none helps; ``before`` is where it comes from, and the
+    last row of the ``table`` of distances the place where it goes to.
+    """
+    ends = [before, *path, len(table) - 1]
     better = True
     while better:
         better = False

@@ -49,13 +49,12 @@ from biodance.records import Array, grouped
 @dataclass(frozen=True, eq=False)
 class Posture:
     """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their
-    scales and the worst ``limit``; ``hard`` how hard it is to take.
+    scales; ``hard`` how hard it is to take.
     """
 
     x: Array
     up: Array
     violation: float = np.inf
-    limit: str = ""
     hard: float = 0.0
 
 
@@ -181,7 +180,7 @@ def solve(
     reserve = np.array([[limit.hold_reserve(stance) for limit in kept]])
     problem = NonlinearProgramme(chain, stance, base, basis, free, kept, objective, reserve)
     state = problem.state(minimise(problem, begin[free], iterations=iterations)[0])
-    return Posture(state.x[0], uprights(state)[0], *Evaluation(problem, state).worst, hard=effort(state)[0])
+    return Posture(state.x[0], uprights(state)[0], Evaluation(problem, state).worst[0], effort(state)[0])
 
 
 def posture_at(chain: Chain, stance: Stance, x: Array) -> Posture:

@@ -121,8 +121,7 @@ class WordSearch:
     work: DesignContext
     enough: float = ENOUGH
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
-    _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
-    _standing: dict[str, Array] = field(default_factory=dict)
+    _moves: dict[tuple[bytes, bytes], Move] = field(default_factory=dict)
     _tables: dict[str, PostureTable] = field(default_factory=dict)
     _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
     _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
@@ -168,7 +167,7 @@ class WordSearch:
                 continue
             was, now = (self.table(stance) for stance in pair)
             if not any(self.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
-                limits = [move.limit for move, _ in self._moves.values() if move.limit]
+                limits = [move.limit for move in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
 
     def postures(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
@@ -205,8 +204,8 @@ class WordSearch:
             for step in some:
                 room, broken, move = *self._kept(step), None
                 if last is not None and not broken:
-                    move, least = self._judged_move(last, step)
-                    room, broken = min(room, least), move.limit
+                    move = self.move(last, step)
+                    room, broken = min(room, move.room), move.limit
                 if broken:
                     why[broken] = why.get(broken, 0) + 1
                 elif room >= AMPLE:
@@ -237,7 +236,7 @@ class WordSearch:
             least = sorted(found, key=lambda step: (len(step.said), step.s))
             yield from (step for step in least if not late(step))
             return
-        still = self.information.white(self._still(table)[[step.s for step in found]])
+        still = self.information.white(table.standing[[step.s for step in found]])
         # Variance removed per second.
         gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
@@ -330,9 +329,6 @@ class WordSearch:
 
     def move(self, last: DanceStep, step: DanceStep) -> Move:
         """Return the move from one step to the next, as `straight_move` finds it."""
-        return self._judged_move(last, step)[0]
-
-    def _judged_move(self, last: DanceStep, step: DanceStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             self._moves[key] = straight_move(self.task(last, step), (last.stance, step.stance), self.enough)
@@ -343,16 +339,9 @@ class WordSearch:
         slower = _LIFTING if last.stance.planted != step.stance.planted else 1.0
         return move_task(self.work, last, step, slower=slower)
 
-    def _still(self, table: PostureTable) -> Array:
-        """Return the regressors (S, 6, 10 N) of standing still in all postures of a table."""
-        key = table.stance.key
-        if key not in self._standing:
-            self._standing[key] = self.information.standing(table.x)
-        return self._standing[key]
-
     def _rows(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
-        still = self.information.of_posture(step.x, self._still(step.table)[step.s])
+        still = self.information.of_posture(step.x, step.table.standing[step.s])
         if last is None:
             return still
         return np.concatenate([still, self.information.of_ways(np.array([[last.x, step.x]]))[0]])

@@ -1,7 +1,7 @@
 """What the subject is asked to do: postures, steps and trials, read from TOML and checked."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -126,12 +126,10 @@ class TrialPlan:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A named sequence of trials; ``postures`` by name includes "stand"; ``belts`` of the treadmill, 0 without one."""
+    """A named sequence of trials; ``belts`` of the treadmill, 0 without one."""
 
     name: str
-    description: str
     trials: tuple[TrialPlan, ...]
-    postures: dict[str, ProtocolPosture] = field(default_factory=dict)
     belts: int = 0
 
 
@@ -169,7 +167,7 @@ def read_protocol(name_or_path: str | Path) -> Protocol:
     belts = raw.get("belts", 0)
     if belts not in (0, 1, 2) or (not belts and any(plan.gait for plan in plans)):
         raise BiodanceError(f"{path}: belts = {belts!r}; legal are 1 and 2 (split-belt), and 0 without any gait.")
-    return Protocol(str(raw.get("name", path.stem)), str(raw.get("description", "")), plans, postures, belts)
+    return Protocol(str(raw.get("name", path.stem)), plans, belts)
 
 
 def _table(path: Path, raw: dict[str, Any], key: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import load_pinocchio
@@ -20,7 +21,7 @@ from biodance.errors import BiodanceError
 from biodance.motion.ik.compiled.legs import Leg
 from biodance.records import SIDES, Array, Wrench
 from biodance.virtual_lab.movement import GAITS, STAND, Gait, TrialPlan
-from biodance.virtual_lab.movement.performance import MARGIN, Performance, motion_through
+from biodance.virtual_lab.movement.performance import MARGIN, Performance, motion_along
 from biodance.virtual_lab.movement.posing import WIDTH, Curves, Z, septic, take_stance, turn_about, without_jumps
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.person.skeleton import REALISTIC, LabTolerances, stream
@@ -87,7 +88,9 @@ class BeltFoot:
         """Return the ground's force (T, 3) N on the foot: smooth, zero in swing, towards the point of ``aim``."""
         s = gait.since_strike(time, self.side) / gait.contact
         # Two feet share the weight: each one's impulse over a stride is half of m G times the stride.
-        vertical = 0.5 * gait.stride * mass * G / (gait.contact * _mean_pulse(gait)) * _pulse(gait, s)
+        stance = np.linspace(0.0, 1.0, 4001)
+        mean = float(np.trapezoid(_pulse(gait, stance), stance))
+        vertical = 0.5 * gait.stride * mass * G / (gait.contact * mean) * _pulse(gait, s)
         # Force along (aim - pressure), its vertical part as prescribed.
         return vertical[:, None] * (aim.at(time) - self.pressure(gait, time)) / aim.height
 
@@ -124,11 +127,6 @@ def _pulse(gait: Gait, s: Array) -> Array:
     # Slow and quick rise in their shares, at the beginning and mirrored at the end.
     grows, falls = ((1 - share) * septic(x / rise) + share * septic(x / quick) for x in (s, 1 - s))
     return np.where(on, grows * falls * (1 - gait.dip * np.cos(4 * np.pi * (s - 0.5))), 0.0)
-
-
-def _mean_pulse(gait: Gait) -> float:
-    s = np.linspace(0.0, 1.0, 4001)
-    return float(np.trapezoid(_pulse(gait, s), s))
 
 
 def _rolling(foot: BeltFoot, gait: Gait, s: Array) -> tuple[Array, Array, Array]:
@@ -277,7 +275,8 @@ class _Problem:
         """Return the centre of mass (N, 3) m and the angular momentum (N, 3) N·m·s about it of the nodes."""
         around = np.arange(-_PAD, len(q) + _PAD)
         # Nodes of the neighbouring strides, so that the spline's ends are far from this one.
-        motion = motion_through(around / STRIDE_RATE, q[np.mod(around, len(q))], self.time)
+        spline = make_interp_spline(around / STRIDE_RATE, q[np.mod(around, len(q))], k=5)
+        motion = motion_along(spline, self.time)
         pin, (model, data) = load_pinocchio(), self.model
         centre, spin = np.empty((len(q), 3)), np.empty((len(q), 3))
         # Angular momentum about the centre of mass, lab axes.

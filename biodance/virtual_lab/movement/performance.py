@@ -53,12 +53,12 @@ class Performance:
     forces: "tuple[AppliedForce, ...]" = ()
 
     @cached_property
-    def _splines(self) -> tuple[Any, Any, Any]:
-        return _splines(self.node_time, self.nodes)
+    def _spline(self) -> Any:
+        return make_interp_spline(self.node_time, self.nodes, k=5)
 
     def motion(self, time: Array) -> Motion:
         """Return the true q, v, a at ``time`` (T,) s, of the true body with its 16 segments."""
-        return _motion(self._splines, time)
+        return motion_along(self._spline, time)
 
     @cached_property
     def _wrench_spline(self) -> Any:
@@ -80,7 +80,8 @@ class Performance:
         place wanted.
         """
         wrench = self.wrench(time)
-        share = self.share_right(time)[:, None]
+        # Of the weight, on the right foot.
+        share = np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)[:, None]
         pressure, stance = wrench.cop(threshold=1.0), self.stance
         # Mean of the places, weighted with the load.
         middle = share * stance.pressure["right"] + (1 - share) * stance.pressure["left"]
@@ -90,10 +91,6 @@ class Performance:
         place[:, :2] = stance.pressure[side] + pressure[:, :2] - middle
         twist = wrench.moment - np.cross(pressure, wrench.force)
         return np.concatenate([weight * wrench.force, weight * (np.cross(place, wrench.force) + twist)], axis=1)
-
-    def share_right(self, time: Array) -> Array:
-        """Return the share (T,) of the weight on the right foot."""
-        return np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)
 
 
 AppliedForce = Callable[[Performance, Array], Array]
@@ -149,7 +146,7 @@ def keep_balance(
     xy = target.copy()
     q = posing.stand_on_feet(person, pose, curves, stance, xy, height=height)
     for _ in range(_ROUNDS):
-        motion = _motion(_splines(time, q), time)
+        motion = motion_along(make_interp_spline(time, q, k=5), time)
         value = true_wrench(person, motion).value
         vertical = value[:, 2]
         # Zero-moment point of the needed wrench.
@@ -175,20 +172,11 @@ def _pendulum(right: Array, h: Array, step: float) -> Array:
     return solve_banded((1, 1), bands, right)
 
 
-def _splines(time: Array, q: Array) -> tuple[Any, Any, Any]:
-    """Return the quintic spline through q and its first two derivatives."""
-    spline = make_interp_spline(time, q, k=5)
-    return spline, spline.derivative(1), spline.derivative(2)
-
-
-def motion_through(node_time: Array, nodes: Array, time: Array) -> Motion:
-    """Return the motion at ``time`` (T,) s of the quintic spline through ``nodes`` (N, 46) at ``node_time`` (N,) s."""
-    return _motion(_splines(node_time, nodes), time)
-
-
-def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
-    """Return the motion of splines through [position, quaternion, angles]; velocities of the root in its own frame."""
-    value, rate, rate2 = (spline(time) for spline in splines)
+def motion_along(spline: Any, time: Array) -> Motion:
+    """Return the motion at ``time`` (T,) s of a spline through nodes [position, quaternion, angles] (N, 46); velocities
+    of the root in its own frame.
+    """
+    value, rate, rate2 = spline(time), spline.derivative(1)(time), spline.derivative(2)(time)
     # A spline through unit quaternions is not of unit length in between.
     norm = np.linalg.norm(value[:, 3:7], axis=1, keepdims=True)
     quaternion = value[:, 3:7] / norm
