@@ -343,7 +343,6 @@ def test_no_line_is_long() -> None:
 
 GROWING = {
     "biodance.app.sessions": {"SessionRun"},
-    "biodance.body.urdf": {"_Carrier"},
     "biodance.dance.search.word_course": {"WordSearch", "_Place"},
     "biodance.diagnosis.watch": {"MarkerWatch", "WrenchWatch"},
 }

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biodance.body.human.skeleton import SEGMENTS
 from biodance.body.parts import smallest_eigenvalues
-from biodance.body.similarity import _SEGMENTS, hoap3
+from biodance.body.similarity import hoap3
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.cli import run
 from biodance.identification.base_parameters import structural_base
@@ -30,14 +31,14 @@ def test_it_weighs_what_the_paper_says_and_can_exist() -> None:
 
 def test_segment_origins_are_the_makers() -> None:
     pose = poses(BODY, standing()[None])
-    for name in _SEGMENTS:
+    for name in SEGMENTS:
         expected = row_numbers(read_table("robots", "hoap3_segments").row(segment=name), "origin_x origin_y origin_z")
         np.testing.assert_allclose(pose.position[0, BODY.segment_index(name)], expected, atol=1e-9, err_msg=name)
 
 
 def test_centre_of_mass_is_the_table_s() -> None:
     pose = poses(BODY, standing()[None])
-    for i, name in enumerate(_SEGMENTS):
+    for i, name in enumerate(SEGMENTS):
         row = read_table("robots", "hoap3_segments").row(segment=name)
         expected = np.add(row_numbers(row, "origin_x origin_y origin_z"), row_numbers(row, "com_x com_y com_z"))
         np.testing.assert_allclose(pose.points([i], BODY.sip.com[i : i + 1])[0, 0], expected, atol=1e-9, err_msg=name)

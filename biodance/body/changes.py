@@ -13,7 +13,6 @@ from biodance.body.parts import (
     JointLimits,
     Part,
     RigidInertia,
-    SegmentMarkers,
     inertial_parameters,
     pseudo_inertia,
     shift_matter,
@@ -92,7 +91,7 @@ def move_marker(body: Body, name: str, shift: Array) -> Body:
     """Return the body with the marker ``name`` moved by ``shift`` (3,) m in the axes of its segment."""
     place = np.array(body.markers.position)
     place[body.markers.names.index(name)] += shift
-    return replace(body, markers=SegmentMarkers(body.markers.names, body.markers.segment, place, body.markers.weight))
+    return replace(body, markers=replace(body.markers, position=place))
 
 
 def carried_by(body: Body, joint: int) -> int:
@@ -112,12 +111,6 @@ def neutral_turn(body: Body, joint: int) -> Array:
     return np.asarray(turn.T)
 
 
-_RANGE, _SPEED, _TORQUE = 1.2, 10.0, 100.0
-"""rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
-_GYRATION = 0.03
-"""m: radius of gyration of a part to which nothing is assigned."""
-_FLAT, _MOST = 1e-9, 0.95
-"""Share of a pseudo-inertia's largest eigenvalue that counts as none, and of a whole that a part may take."""
 _TRACE = 1e-4
 """Share of a segment's mass of a `Part` to which nothing is assigned (a collar bone): model formats refuse none."""
 
@@ -149,7 +142,8 @@ def with_part(body: Body, cut: Cut, *, rest_moves: bool = False) -> Body:
     # Per kilogram of the whole; what moves in its own frame (origin at its joint).
     share = (cut.phi if rest_moves else shift_matter(-cut.place) @ cut.phi) / body.sip.phi[10 * segment]
     if not cut.phi.any():
-        share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), _GYRATION**2 * np.eye(3)))
+        # 0.03 m: radius of gyration of a part to which nothing is assigned
+        share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), 0.03**2 * np.eye(3)))
     jointed = _jointed(body, cut, segment, len(body.links))
     return replace(jointed, parts=(*body.parts, Part(cut.name, segment, share, rest_moves)))
 
@@ -210,12 +204,12 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
     own = moved @ phi[rows[1]]
     # Of W = rest + part, V and E^1/2 with W = V E V': in these units the whole is 1.
     value, vector = np.linalg.eigh(pseudo_inertia(phi[rows[0]] + own)[0])
-    root = np.sqrt(np.maximum(value, _FLAT * value[-1]))
+    root = np.sqrt(np.maximum(value, 1e-9 * value[-1]))  # a smaller share of the largest is none
     # Share of the part in each direction: W^-1/2 P W^-1/2.
     share = (vector / root).T @ pseudo_inertia(own)[0] @ (vector / root)
     level, axes = np.linalg.eigh(share)
-    # Limited to `_MOST` in each of its own directions, and back to units of mass.
-    less = (vector * root) @ (axes * np.minimum(level, _MOST)) @ axes.T @ (vector * root).T
+    # Limited to 95 % of the whole in each of its own directions, and back to units of mass.
+    less = (vector * root) @ (axes * np.minimum(level, 0.95)) @ axes.T @ (vector * root).T
     # Ten parameters from a symmetric 4 x 4 matrix that the map can make: exact.
     left = np.linalg.lstsq(PSEUDO_INERTIA, less.ravel(), rcond=None)[0]
     phi[rows[0]] += own - left
@@ -233,18 +227,15 @@ def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
     for index in cut.joints:
         moved = body.joints[index]
         shifted[index] = replace(moved, parent=first + count - 1, translation=moved.translation - cut.place)
-    wide = {"lower": -_RANGE, "upper": _RANGE, "velocity": _SPEED, "torque_lower": -_TORQUE, "torque_upper": _TORQUE}
+    # rad, rad/s, N·m: wide enough for any joint that is put in to follow markers
+    wide = {"lower": -1.2, "upper": 1.2, "velocity": 10.0, "torque_lower": -100.0, "torque_upper": 100.0}
     limits = {
         key: np.insert(getattr(body.limits, key), first, np.full(count, value, dtype=float))
         for key, value in wide.items()
     }
     joints = (*shifted[:first], *added, *shifted[first:])
-    return replace(body, joints=joints, limits=JointLimits(**limits), markers=_markers(body, cut, new))
-
-
-def _markers(body: Body, cut: Cut, new: int) -> SegmentMarkers:
     on = np.array([name in cut.markers for name in body.markers.names])
-    segment = tuple(new if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
-    return replace(
-        body.markers, segment=segment, position=body.markers.position - np.where(on[:, None], cut.place, 0.0)
-    )
+    segments = tuple(new if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
+    places = body.markers.position - np.where(on[:, None], cut.place, 0.0)
+    worn = replace(body.markers, segment=segments, position=places)
+    return replace(body, joints=joints, limits=JointLimits(**limits), markers=worn)

@@ -21,13 +21,11 @@ import numpy as np
 from biodance.body import parts
 from biodance.body.body import Body
 from biodance.body.changes import place_at_zero, written_in
+from biodance.body.human.skeleton import SEGMENTS
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, Sip
 from biodance.spatial import elementary_rotation
-
-_LEANS = np.cos(np.radians(30.0))
-"""Cosine of the largest angle between a sole and the ground at zero joint angles."""
 
 
 def standing_frames(body: Body) -> Body:
@@ -45,7 +43,7 @@ def standing_frames(body: Body) -> Body:
         foot = body.feet[side]
         turn, _ = place_at_zero(body, body.segment_joint[foot.segment])
         up = turn @ sole_normal(foot)
-        if not up[1] > _LEANS:
+        if not up[1] > np.cos(np.radians(30.0)):
             away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
             raise BiodanceError(
                 f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the "
@@ -182,10 +180,6 @@ def com_deviation(lump: parts.RigidInertia) -> float:
     return float(_COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))
 
 
-_SEGMENTS = (
-    "pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head",
-    "right_upper_arm", "right_forearm_hand", "left_upper_arm", "left_forearm_hand",
-)  # fmt: skip
 _CARRIES = {
     "hip_pitch": "thigh",
     "knee_pitch": "shank",
@@ -194,11 +188,6 @@ _CARRIES = {
     "elbow_pitch": "forearm_hand",
 }
 """The last joint before each segment."""
-_LEG_BASE, _ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
-"""m: where legs start in the pelvis (ISB axes) and arms in the trunk (forwards, left, up); Fujitsu, table 6.1-2."""
-_SHOULDER = 0.111  # m, from the middle to either shoulder
-_ANKLE_HEIGHT, _SOLE_AHEAD, _SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
-"""m: sole under the ankle, from heel to toe, half its width about its middle line."""
 _CENTRE_SD = 0.010  # m, prior standard deviation of every centre of mass; the others in `robot_prior`
 
 
@@ -210,10 +199,10 @@ def hoap3() -> Body:
     for joint in joints:
         chain.append((parts.UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
         if joint.segment >= 0:
-            turns[_SEGMENTS[joint.segment]] = chain[-1]
-    lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]
+            turns[SEGMENTS[joint.segment]] = chain[-1]
+    lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in SEGMENTS]
     rows = [read_table("robots", "hoap3_joints").row(joint=joint.name) for joint in joints]
-    corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in _SEGMENTS]
+    corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in SEGMENTS]
     columns = "x_min y_min z_min x_max y_max z_max"
     boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
     phi = np.concatenate([parts.inertial_parameters(lump) for lump in lumps])
@@ -221,9 +210,9 @@ def hoap3() -> Body:
     # 1.0 rad/s, the limit that Bonnet 2016 used for this robot
     return Body(
         "HOAP-3",
-        _SEGMENTS,
+        SEGMENTS,
         joints,
-        Sip(_SEGMENTS, phi, robot_covariance(lumps, [_CENTRE_SD] * len(lumps))),
+        Sip(SEGMENTS, phi, robot_covariance(lumps, [_CENTRE_SD] * len(lumps))),
         parts.JointLimits(np.radians(low), np.radians(high), np.full(len(rows), 1.0), -torque, torque),
         parts.SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
@@ -241,7 +230,7 @@ def _joints() -> tuple[parts.Joint, ...]:
         name = row["joint"]
         side, _, kind = name.partition("_")
         if name == "waist_pitch":
-            carried, y = _SEGMENTS.index("trunk_head"), np.array([0.0, 1.0, 0.0])
+            carried, y = SEGMENTS.index("trunk_head"), np.array([0.0, 1.0, 0.0])
             joints.append(parts.Joint(name, -1, y, parts.UPRIGHT.T, np.zeros(3), carried, "bend forwards"))
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
@@ -252,19 +241,20 @@ def _joints() -> tuple[parts.Joint, ...]:
         if kind in ("hip_yaw", "shoulder_pitch"):
             parent, base, place = _base(kind, side, joints)
             rotation, translation = base @ rotation, place + base @ translation
-        carried = _SEGMENTS.index(f"{side}_{_CARRIES[kind]}") if kind in _CARRIES else -1
+        carried = SEGMENTS.index(f"{side}_{_CARRIES[kind]}") if kind in _CARRIES else -1
         joints.append(parts.Joint(name, parent, z, rotation, translation, carried))
     return tuple(joints)
 
 
 def _base(kind: str, side: str, joints: list[parts.Joint]) -> tuple[int, Array, Array]:
-    """Return the parent joint and the fixed frame (turn, place) at which a leg or an arm starts."""
-    z = np.array([0.0, 0.0, 1.0])
+    """Return the parent joint and the fixed frame (turn, place) at which a leg or an arm starts; legs start in ISB
+    axes, arms forwards, left, up (Fujitsu, table 6.1-2), 0.111 m from the middle.
+    """
     tilt = elementary_rotation("x", -np.pi / 2)
     if kind == "hip_yaw":
-        return -1, tilt @ elementary_rotation("z", np.pi / 2), _LEG_BASE
+        return -1, tilt @ elementary_rotation("z", np.pi / 2), np.array([-0.035, -0.055, 0.0])
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
-    return waist, tilt, _ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
+    return waist, tilt, [-0.035, 0.0, 0.125] + tilt @ [0.0, 0.0, 0.111 if side == "left" else -0.111]
 
 
 def _lump(row: TableRow, turn: Array) -> parts.RigidInertia:
@@ -277,7 +267,6 @@ def _lump(row: TableRow, turn: Array) -> parts.RigidInertia:
 
 def _sole(side: str) -> parts.Foot:
     """Return the sole in the foot's frame (x up, z forwards), counter-clockwise seen from above."""
-    middle = 0.005 if side == "right" else -0.005
-    heel, toe = _SOLE_AHEAD
-    corners = [(heel, -_SOLE_WIDE), (heel, _SOLE_WIDE), (toe, _SOLE_WIDE), (toe, -_SOLE_WIDE)]
-    return parts.Foot(_SEGMENTS.index(f"{side}_foot"), np.array([[-_ANKLE_HEIGHT, middle + y, z] for z, y in corners]))
+    middle, heel, toe, half = 0.005 if side == "right" else -0.005, -0.040, 0.068, 0.036
+    corners = [(heel, -half), (heel, half), (toe, half), (toe, -half)]
+    return parts.Foot(SEGMENTS.index(f"{side}_foot"), np.array([[-0.040, middle + y, z] for z, y in corners]))

@@ -5,7 +5,7 @@ The root's frame is turned to x forwards, y up, z right (as the human pelvis) wh
 backwards. All other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,28 +23,9 @@ from biodance.body.similarity import (
     robot_covariance,
     solid,
 )
-from biodance.body.urdf_file import Connection, UrdfFile, match_faces, read_urdf_file, sole_outline
+from biodance.body.urdf_file import Connection, Link, UrdfFile, match_faces, read_urdf_file, sole_outline
 from biodance.errors import BiodanceError, FileRefused, known_index
 from biodance.records import SIDES, Array, Sip
-
-
-@dataclass
-class _Carrier:
-    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps``, ``shapes`` and
-    ``hulls`` in its frame, and why meshes could not be read.
-    """
-
-    link: str
-    joint: int
-    lumps: list[parts.RigidInertia]
-    shapes: list[Array] = field(default_factory=list)
-    hulls: list[Array] = field(default_factory=list)
-    unread: list[str] = field(default_factory=list)
-
-    @property
-    def corners(self) -> Array:
-        """(K, 3) m, corners of all shapes; empty without any."""
-        return np.concatenate([np.empty((0, 3)), *self.shapes, *self.hulls])
 
 
 def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) -> Body:
@@ -69,7 +50,7 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
     heavy = [carrier for carrier in carriers if carrier.lumps]
     if not carriers[0].lumps:
         raise FileRefused(
-            f"{file.path}: the root link {carriers[0].link} has no mass, nor has what is fixed to it. Give it an "
+            f"{file.path}: the root link {carriers[0].name} has no mass, nor has what is fixed to it. Give it an "
             "<inertial>."
         )
     for foot in feet:
@@ -83,10 +64,10 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
 
 
 def _body(
-    file: UrdfFile, joints: list[parts.Joint], limits: parts.JointLimits, heavy: list[_Carrier], *, mend: bool
+    file: UrdfFile, joints: list[parts.Joint], limits: parts.JointLimits, heavy: list[Link], *, mend: bool
 ) -> Body:
     """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
-    segments = tuple(carrier.link for carrier in heavy)
+    segments = tuple(carrier.name for carrier in heavy)
     written = [parts.combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, written, strict=True)])
@@ -104,7 +85,7 @@ def _body(
         np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
         notes=_notes(
             file,
-            guessed=[carrier.link for carrier in heavy if not carrier.corners.size],
+            guessed=[carrier.name for carrier in heavy if not carrier.corners.size],
             points=[segment for segment, lump in zip(segments, lumps, strict=True) if is_point(lump)],
             mended=[segment for segment, old, new in zip(segments, written, lumps, strict=True) if new is not old],
         ),
@@ -122,11 +103,13 @@ def _possible(lump: parts.RigidInertia, box: Array) -> parts.RigidInertia:
     return solid(lump, box) if lump.mass > 0 and not is_possible(lump) else lump
 
 
-def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_Carrier], dict[str, _Carrier]]:
-    """Return joints, limits, the links that move and, of every link, the one that carries it."""
-    first = _Carrier(_root(file), -1, [])
-    owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
-    joints, rows, carriers, waiting = list[parts.Joint](), list[Connection](), [first], _on(file, first.link)
+def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[Link], dict[str, Link]]:
+    """Return joints, limits, the links that move with all that is fixed to them and, of every link, the one that
+    carries it.
+    """
+    root = _root(file)
+    moving, owner, frame = {root: Link(root)}, {root: root}, {root: (np.eye(3), np.zeros(3))}
+    joints, rows, waiting = list[parts.Joint](), list[Connection](), _on(file, root)
     while waiting:
         c = waiting.pop(0)
         (turn, place), above = frame[c.parent], owner[c.parent]
@@ -135,27 +118,21 @@ def _tree(file: UrdfFile) -> tuple[list[parts.Joint], parts.JointLimits, list[_C
         if c.kind == "fixed":
             owner[c.child], frame[c.child] = above, (turn, place)
         else:
-            joints.append(parts.Joint(c.name, above.joint, c.axis, turn, place))
+            joints.append(parts.Joint(c.name, moving[above].joint, c.axis, turn, place))
             rows.append(c)
-            owner[c.child], frame[c.child] = _Carrier(c.child, len(joints) - 1, []), (np.eye(3), np.zeros(3))
-            carriers.append(owner[c.child])
+            owner[c.child], frame[c.child] = c.child, (np.eye(3), np.zeros(3))
+            moving[c.child] = Link(c.child, joint=len(joints) - 1)
         waiting = [*_on(file, c.child), *waiting]
     lost = [name for name in file.links if name not in owner]
     if lost:
         raise FileRefused(
-            f"{file.path}: the link {lost[0]} does not hang on the root {first.link}. Correct the joints above it."
+            f"{file.path}: the link {lost[0]} does not hang on the root {root}. Correct the joints above it."
         )
     for name, link in file.links.items():
-        (turn, place), carrier = frame[name], owner[name]
-        if link.lump is not None:
-            # Lump in the carrier's frame: turned, then moved.
-            turned = parts.turn_inertia(link.lump, turn)
-            carrier.lumps.append(replace(turned, com=turned.com + place))
-        carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
-        carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
-        carrier.unread += link.unread
+        moving[owner[name]] = moving[owner[name]].holding(link, *frame[name])
     table = np.array([[c.lower, c.upper, c.velocity, c.effort] for c in rows]).reshape(-1, 4)
-    return joints, parts.JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3]), carriers, owner
+    limits = parts.JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3])
+    return joints, limits, [*moving.values()], {name: moving[carrier] for name, carrier in owner.items()}
 
 
 def _root(file: UrdfFile) -> str:
@@ -176,7 +153,7 @@ def _on(file: UrdfFile, link: str) -> list[Connection]:
     return [connection for connection in file.connections if connection.parent == link]
 
 
-def _box(carrier: _Carrier, lump: parts.RigidInertia) -> Array:
+def _box(carrier: Link, lump: parts.RigidInertia) -> Array:
     """Return the box (2, 3) m around the shapes of a segment; without any, one with its moments of inertia."""
     corners = carrier.corners
     if corners.size:
@@ -202,7 +179,7 @@ def _notes(file: UrdfFile, *, guessed: list[str], points: list[str], mended: lis
     return tuple(f"{sentence} {', '.join(names)}." for sentence, names in notes.items() if names)
 
 
-def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
+def _standing(file: UrdfFile, body: Body, feet: dict[str, Link]) -> Body:
     """Return the body with its soles, its root in ISB axes."""
     place = {side: place_at_zero(body, carrier.joint) for side, carrier in feet.items()}
     below = np.mean([position for _, position in place.values()], axis=0)
@@ -215,7 +192,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
     # the root's x axis points backwards (iCub) where along it the foot that is named right is on the left
     crossed = float((place["right"][1] - place["left"][1]) @ np.cross(ahead, up)) < 0
-    one, other = (feet[side].link.lower() for side in SIDES)
+    one, other = (feet[side].name.lower() for side in SIDES)
     pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
     if crossed and any(this in one and one.replace(this, that) == other for this, that in pairs):
         ahead = -ahead
@@ -225,16 +202,16 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
         if not carrier.corners.size:
             why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
             raise FileRefused(
-                f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>."
+                f"{file.path}: the {side} foot {carrier.name} shows no sole, since {why}. Give it a collision <box>."
             )
-        where = f"{file.path}: the foot {carrier.link}"
-        soles[side] = sole_outline(where, carrier.shapes, carrier.hulls, axes @ place[side][0])
+        where = f"{file.path}: the foot {carrier.name}"
+        soles[side] = sole_outline(where, carrier.boxes, carrier.hulls, axes @ place[side][0])
     soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
     right, left = (float(place[side][1] @ sideways) for side in SIDES)
     if not right > left:
         raise FileRefused(
-            f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then "
+            f"{file.path}: {feet['right'].name} stands left of {feet['left'].name}; name the right foot first, then "
             f"the left one."
         )
-    standing = replace(body, feet={side: parts.Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
+    standing = replace(body, feet={side: parts.Foot(body.segment_index(feet[side].name), soles[side]) for side in feet})
     return standing if np.array_equal(axes, np.eye(3)) else reframed(standing, 0, axes.T, np.zeros(3))

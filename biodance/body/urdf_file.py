@@ -6,6 +6,7 @@ wiki.ros.org/urdf/XML.
 """
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,7 +15,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring
 
 import numpy as np
 
-from biodance.body.parts import RigidInertia
+from biodance.body.parts import RigidInertia, turn_inertia
 from biodance.body.solids import read_mesh
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
@@ -62,14 +63,12 @@ def _mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
     return np.asarray(corners)
 
 
-_LAYER = 0.002
-"""m: corners of a mesh this near to its lowest plane belong to the sole; meshes have rounded edges."""
 _STEEPEST = 0.5  # Cosine of the largest angle between a sole and the ground at zero joint angles
 CORNERS = 12
 """A sole keeps at most so many corners, those that leave it largest, all on its outline: support is not overrated."""
 
 
-def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array) -> Array:
+def sole_outline(where: str, boxes: Sequence[Array], hulls: Sequence[Array], axes: Array) -> Array:
     """Return the sole (P, 3) m of a foot, counter-clockwise from above: the face of its shapes that lies lowest and
     nearest to horizontal.
 
@@ -95,8 +94,8 @@ def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array
         raise FileRefused(
             f"{where} has no face that points to the ground at zero joint angles. Give it a collision <box>."
         )
-    # 0.0005 m: corners of a foot of boxes this near to the plane of its sole belong to it
-    low = corners[corners @ down > (corners @ down).max() - (_LAYER if hulls else 0.0005)]
+    # m: corners this near to the plane of the sole belong to it; meshes have rounded edges
+    low = corners[corners @ down > (corners @ down).max() - (0.002 if hulls else 0.0005)]
     flat = np.stack([low @ ahead, -(low @ right)], axis=1)  # x forwards, y left: counter-clockwise is from above
     try:
         outline = ConvexHull(flat).vertices
@@ -111,7 +110,7 @@ def match_faces(one: Array, other: Array) -> tuple[Array, Array]:
     return _refined(one, most), _refined(other, most)
 
 
-def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
+def _down(boxes: Sequence[Array], hulls: Sequence[Array], up: Array) -> Array:
     """Return the outward normal (3,) of the most horizontal face; of meshes, of the largest one within the limit."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -162,17 +161,33 @@ _X = np.array([1.0, 0.0, 0.0])  # Axis of a joint that names none
 
 
 @dataclass(frozen=True, eq=False)
-class _Link:
-    """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's
-    frame: ``shapes`` corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the
-    convex hulls of those that are; ``unread`` why a mesh could not be read.
+class Link:
+    """One link, or one that moves with all that is fixed to it: ``lumps``, none without mass; of its collision (else
+    visual) shapes ``boxes``, corners (8, 3) m around those that are no meshes, and ``hulls``, corners (K, 3) m of the
+    convex hulls of those that are, all in the link's frame; ``unread`` why meshes could not be read; ``joint`` index
+    of what moves it, -1 for the root.
     """
 
     name: str
-    lump: RigidInertia | None
-    shapes: tuple[Array, ...]
+    lumps: tuple[RigidInertia, ...] = ()
+    boxes: tuple[Array, ...] = ()
     hulls: tuple[Array, ...] = ()
     unread: tuple[str, ...] = ()
+    joint: int = -1
+
+    @property
+    def corners(self) -> Array:
+        """(K, 3) m, corners of all shapes; empty without any."""
+        return np.concatenate([np.empty((0, 3)), *self.boxes, *self.hulls])
+
+    def holding(self, other: "Link", turn: Array, place: Array) -> "Link":
+        """Return the link with ``other`` fixed to it, whose frame is at ``turn`` (3, 3) and ``place`` (3,) m."""
+        # Lumps in the frame of this link: turned, then moved.
+        turned = (turn_inertia(lump, turn) for lump in other.lumps)
+        lumps = (replace(lump, com=lump.com + place) for lump in turned)
+        boxes, hulls = ([corners @ turn.T + place for corners in some] for some in (other.boxes, other.hulls))
+        unread = (*self.unread, *other.unread)
+        return Link(self.name, (*self.lumps, *lumps), (*self.boxes, *boxes), (*self.hulls, *hulls), unread, self.joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +217,7 @@ class UrdfFile:
 
     path: Path
     name: str
-    links: dict[str, _Link]
+    links: dict[str, Link]
     connections: tuple[Connection, ...]
 
 
@@ -258,16 +273,17 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
     return turn, _row(path, origin, "xyz", what, "0 0 0")
 
 
-def _link(path: Path, element: Element) -> _Link:
+def _link(path: Path, element: Element) -> Link:
     name = element.get("name") or ""
     what = f"link {name!r}"
     lump, unread = _lump(path, element.find("inertial"), what), list[str]()
+    lumps = () if lump is None else (lump,)
     for kind in ("collision", "visual"):
         elements = element.findall(kind)
         shapes, hulls = _shapes(path, elements, what), _mesh_hulls(path, elements, what, unread)
         if shapes or hulls:
-            return _Link(name, lump, shapes, hulls)
-    return _Link(name, lump, (), (), tuple(unread))
+            return Link(name, lumps, shapes, hulls)
+    return Link(name, lumps, unread=tuple(unread))
 
 
 def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | None:

@@ -25,7 +25,7 @@ from biodance.lab.session.entries import plate_lines
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_below
-from biodance.lab.session.subject import declared_mass, declared_stature
+from biodance.lab.session.subject import declared
 from biodance.records import Plate, Session, Trial
 from biodance.settings import COP_FORCE
 
@@ -125,8 +125,8 @@ def inspect_file(
         "plates": plates,
         "mean_vertical_n": float(sum(as_read)) if as_read else None,
         "mass_on_plates_kg": standing_mass(trial),
-        "declared_mass_kg": _number(declared_mass(trial.measurements)),
-        "declared_height_m": _number(declared_stature(trial.measurements)),
+        "declared_mass_kg": _number(declared(trial.measurements, "mass")),
+        "declared_height_m": _number(declared(trial.measurements, "stature")),
         "history": list(trial.history),
         "warnings": warnings,
     }

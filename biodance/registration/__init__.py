@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,21 +36,19 @@ def rival_delays(
     explain most, those that explain 85 % of it.
     """
     near = [one for one in hypotheses[1:] if one.gain > 0.85 * hypotheses[0].gain][:3]
-    return tuple(one for one in near if _remains(one, found, refine))
-
-
-def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refined]) -> bool:
     if found.rows < ENOUGH_ROWS:
-        return True
-    try:
-        other = refine(one.pose)
-    except TrialRefused:
-        return False
-    if abs(other.pose.delay - found.pose.delay) < 0.03:  # refined, both are one
-        return False
-    # Log likelihood ratio: half the difference of the sums of squares (mean square times rows).
-    worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
-    return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > 10.0)
+        return tuple(near)
+    remaining = []
+    for one in near:
+        with suppress(TrialRefused):
+            other = refine(one.pose)
+            # Log likelihood ratio: half the difference of the sums of squares (mean square times rows).
+            worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
+            apart = abs(other.pose.delay - found.pose.delay) >= 0.03  # else both, refined, are one
+            clearly_worse = other.rows < ENOUGH_ROWS or (np.isfinite(worse) and worse > 10.0)
+            if apart and not clearly_worse:
+                remaining.append(one)
+    return tuple(remaining)
 
 
 _SURE = 1.645
@@ -239,22 +238,18 @@ def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> st
             "are of another trial or person, or the body's mass is wrong. Give the two files of one trial."
         )
     if rivals:
-        return _rivalry(best, rivals[0])
+        late, turned = rivals[0].pose.delay - best.pose.delay, _within(rivals[0].pose.yaw - best.pose.yaw)
+        return (
+            f"A second solution is nearly as good ({100 * rivals[0].gain / best.gain:.0f} % of what the best one "
+            f"explains): {late:+.2f} s of delay and {np.degrees(turned):+.0f} degrees of yaw from the best. Record a "
+            "movement that does not repeat itself: a step aside, a one-leg stance, one fast squat."
+        )
     if found.misfit > 6.0:
         return (
             f"The pressure does not lie in the feet as it does in people (misfit {found.misfit:.1f}, 1 expected): the "
             "plates do not lie to one another as their file says, or it is another movement. Give one plate at a time."
         )
     return ""
-
-
-def _rivalry(best: Alignment, other: Alignment) -> str:
-    late, turned = other.pose.delay - best.pose.delay, _within(other.pose.yaw - best.pose.yaw)
-    return (
-        f"A second solution is nearly as good ({100 * other.gain / best.gain:.0f} % of what the best one explains): "
-        f"{late:+.2f} s of delay and {np.degrees(turned):+.0f} degrees of yaw from the best. Record a movement that "
-        "does not repeat itself: a step aside, a one-leg stance, one fast squat."
-    )
 
 
 def _too_wide(covariance: Array, limits: Limits) -> str:

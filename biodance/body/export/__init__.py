@@ -134,12 +134,6 @@ def six(inertia: Array) -> str:
     return row(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
 
 
-_OF_SEGMENTS = ("csv",)
-"""Formats that say what is known of the segments as wholes; all others show the parts as bodies of their own."""
-_ROUNDING = 1e-9
-"""Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
-
-
 class ModelFormat(Protocol):
     """One format of models: a module, a class or an object."""
 
@@ -185,7 +179,8 @@ def refuse_impossible(body: Body) -> None:
                 "positive."
             )
         value = np.linalg.eigvalsh(pseudo_inertia(phi)[0])
-        if value[0] < -_ROUNDING * value[-1]:
+        # by so small a share of the largest, the smallest may be negative from rounding alone
+        if value[0] < -1e-9 * value[-1]:
             raise BiodanceError(
                 f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue {value[0]:.3g}, "
                 "must be >= 0), so no model is written. Use physically consistent parameters."
@@ -211,7 +206,7 @@ def write_model(
     path = Path(path)
     (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
-    if kind.FORMAT not in _OF_SEGMENTS:
+    if kind.FORMAT != "csv":  # it says what is known of the segments as wholes; others show the parts as bodies
         body = parts_as_segments(body)
         refuse_impossible(body)
     write: Callable[..., str | bytes] = getattr(kind, "data", None) or kind.text

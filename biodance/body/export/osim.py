@@ -22,7 +22,6 @@ FORMAT = "osim"
 SUFFIX = ".osim"
 _GEOMETRY = "Geometry"  # Folder beside the model in which OpenSim looks for meshes
 ROOT_ROTATIONS = ("tilt", "list", "rotation")
-_ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROOT_TRANSLATIONS = ("tx", "ty", "tz")
 
 
@@ -100,7 +99,8 @@ def _joint(joints: Element, body: Body, branch: Branch) -> None:
     add(frame, "orientation", row(euler_angles("XYZ", branch.rotation)))
     transform = add(element, "SpatialTransform")
     if free:
-        turns, names = _ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
+        # About z, x and y, as OpenSim names the pelvis' turns.
+        turns, names = np.eye(3)[[2, 0, 1]], [f"{name}_{word}" for word in ROOT_ROTATIONS]
         shifts = [f"{name}_{word}" for word in ROOT_TRANSLATIONS]
         ranges = [(-10.0, 10.0)] * 6
     else:

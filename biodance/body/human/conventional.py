@@ -9,16 +9,15 @@ import numpy as np
 
 from biodance.body.human.measures import Measures, chord, unit
 from biodance.body.human.scaling import measure_static
-from biodance.body.human.static_centres import SIGN, frame_yz, hip_centres
+from biodance.body.human.static_centres import frame_yz, hip_centres
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import canonical, landmark, read_marker_set
+from biodance.lab.markers.upright import OUTWARDS
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.spatial import elementary_rotation, zxy_angles
 
 _PELVIS = ("right_asis", "left_asis", "mid_psis")
 _LEG = ("thigh_wand", "knee_lateral", "shank_wand", "ankle_lateral", "toe")
-_ROUNDS = 8
-"""Rounds in which a turned wand and the centre that it gives settle; each leaves a tenth of the error at most."""
 _Marks = Mapping[str, Array]
 
 
@@ -59,7 +58,7 @@ class ConventionalModel:
         pelvis, thigh, shank, ankle, foot = self._segments(
             {name: track[part] for name, track in self.mark.items()}, side
         )
-        foot, sign, (x, y) = foot @ self.legs[side].foot, SIGN[side], ahead
+        foot, sign, (x, y) = foot @ self.legs[side].foot, OUTWARDS[side], ahead
         lab = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
         tilt, over, turn = zxy_angles(lab @ pelvis)
         flexion, adduction, rotation = zxy_angles(np.swapaxes(pelvis, -1, -2) @ thigh)
@@ -95,8 +94,8 @@ class ConventionalModel:
         hip, leg, radius = hips[side], self.legs[side], self.sizes.marker_radius
         knee = _turned_chord(hip, knee_at, self.sizes.widths[f"{side}_knee"] / 2 + radius, wand, leg.thigh)
         ankle = _turned_chord(knee, ankle_at, self.sizes.widths[f"{side}_ankle"] / 2 + radius, other, leg.shank)
-        thigh = frame_yz(hip - knee, SIGN[side] * (knee_at - knee))
-        shank = frame_yz(knee - ankle, SIGN[side] * (ankle_at - ankle))
+        thigh = frame_yz(hip - knee, OUTWARDS[side] * (knee_at - knee))
+        shank = frame_yz(knee - ankle, OUTWARDS[side] * (ankle_at - ankle))
         return pelvis, thigh, shank @ elementary_rotation("y", leg.torsion), shank, _along(toe - ankle, shank)
 
 
@@ -110,7 +109,8 @@ def _along(forward: Array, shank: Array) -> Array:
 def _turned_chord(proximal: Array, marker: Array, distance: float, wand: Array, turn: float) -> Array:
     """Return joint centres (..., 3) m as `chord`, with the wand first turned by ``turn`` rad about the bone."""
     centre = chord(proximal, marker, distance, wand)
-    for _ in range(_ROUNDS if turn else 0):
+    # The turned wand and the centre that it gives settle: each round leaves a tenth of the error at most.
+    for _ in range(8 if turn else 0):
         bone, arm = unit(proximal - centre), wand - centre
         # Rodrigues: the part of the arm along the bone stays.
         along = np.vecdot(bone, arm)[..., None] * bone
@@ -162,9 +162,9 @@ def _calibrated(mark: _Marks, sizes: Measures, hip: Array, side: str) -> _Leg:
     outside_ankle = 2 * ankle_lateral - mark[f"{side}_ankle_medial"] if malleoli else shank_wand
     knee = chord(hip, lateral, sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius, outside)
     ankle = chord(knee, ankle_lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside_ankle)
-    shank = frame_yz(knee - ankle, SIGN[side] * (ankle_lateral - ankle))
+    shank = frame_yz(knee - ankle, OUTWARDS[side] * (ankle_lateral - ankle))
     # The knee's axis in the shank's frame, turned about its y: (sin, 0, cos).
-    axis = shank.T @ frame_yz(knee - ankle, SIGN[side] * (lateral - knee))[:, 2]
+    axis = shank.T @ frame_yz(knee - ankle, OUTWARDS[side] * (lateral - knee))[:, 2]
     sole = (toe - mark[f"{side}_heel"]) * [1.0, 1.0, 0.0]
     return _Leg(
         _turn_of_wand(hip, knee, lateral, wand) if marked else 0.0,

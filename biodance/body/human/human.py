@@ -55,7 +55,6 @@ from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject, grouped
 from biodance.settings import STANDARD_GRAVITY, Settings
 
-_AXES = ("sagittal", "longitudinal", "transverse")
 _BOTH = (WOMAN, MAN)
 _TRUNK = ("pelvis", "trunk_head")
 
@@ -124,15 +123,12 @@ def _within(kind: str) -> _Spread:
     # The centres of the parts err independently, each counts with its share of the mass.
     com = np.linalg.norm(share * [regression(part, "com", "longitudinal", MAN)[1] for part in parts]) / length
     along = np.array([com, 0.0, 0.0]) if kind == "foot" else np.array([0.0, com, 0.0])
-    names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else _AXES
-    radii = np.array([share @ [_radius_sd(part, axis) for part in parts] for axis in names])
-    return _Spread(float(np.linalg.norm(mass_sd) / mass.sum()), along, radii, np.zeros(3))
-
-
-def _radius_sd(part: str, axis: str) -> float:
-    (moment, moment_sd), (mass, mass_sd) = regression(part, "inertia", axis, MAN), regression(part, "mass", "", MAN)
+    names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else ("sagittal", "longitudinal", "transverse")
+    moments = np.array([[regression(part, "inertia", axis, MAN) for part in parts] for axis in names])
     # var(log k²) = var(log J) - var(log m); the radius k has half of that standard deviation.
-    return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))
+    variance = (moments[..., 1] / moments[..., 0]) ** 2 - (mass_sd / mass) ** 2
+    radii = np.array([share @ row for row in 0.5 * np.sqrt(np.maximum(variance, 0.0))])
+    return _Spread(float(np.linalg.norm(mass_sd) / mass.sum()), along, radii, np.zeros(3))
 
 
 MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
@@ -188,14 +184,10 @@ def _weigh(
     return tuple(lump_from(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
-_CHILD_AGE, _CHILD_STATURE = 18.0, 1.50
-"""years, m: below, a person is a child; the stature counts where the age is not known (1.50 m: one adult woman in
-twenty is smaller, ANSUR II 2012)."""
-
-
 def is_child(subject: Subject) -> bool:
     """Return whether age, or the stature of somebody whose age is not known, says child."""
-    return subject.stature < _CHILD_STATURE if np.isnan(subject.age) else subject.age < _CHILD_AGE
+    # 1.50 m: one adult woman in twenty is smaller (ANSUR II 2012)
+    return subject.stature < 1.50 if np.isnan(subject.age) else subject.age < 18.0
 
 
 def child_widening(subject: Subject) -> float:
@@ -316,10 +308,6 @@ def _primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array
     return np.array([kind.mass * lump.mass, *(kind.com * length), *tensor])
 
 
-_LUMBAR_HEIGHT = 0.112 / 1.755
-"""Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
-
-
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
     """Return where the CoM may be, (12, 2, 3) m: three standard deviations around the prior, inside the shape box."""
     # Half width of a CoM box in prior standard deviations
@@ -409,8 +397,9 @@ def assemble(
     usual, corners = reference(table, subject), "x_min y_min z_min x_max y_max z_max"
     rows = [row_numbers(read_table("human", "boxes").row(segment=kind_of(s)), corners) for s in SEGMENTS]
     boxes = np.array(rows).reshape(-1, 2, 3) * skeleton.stature
-    # The box ends at the vertex, counted from this person's trunk joint instead of the usual lumbar one.
-    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - _LUMBAR_HEIGHT * skeleton.stature
+    # The box ends at the vertex, counted from this person's trunk joint instead of the lumbar one from which the
+    # table measures the trunk: 0.112 m over the hips at 1.755 m (ANSUR II).
+    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - 0.112 / 1.755 * skeleton.stature
     opinions = body_opinions(usual, skeleton, subject)
     sip = prior(usual, skeleton, subject, opinions)
     along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None

@@ -21,7 +21,6 @@ from biodance.records import SIDES, Array, FootSizes, Subject
 
 WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
 _LIVING = ("adult", "older")
-_OWN_CUT = ("chen_2011", "ma_2011", "pavol_2002")
 
 
 def published_fractions(kind: str, who: Subject) -> list[float]:
@@ -31,7 +30,7 @@ def published_fractions(kind: str, who: Subject) -> list[float]:
     living = [
         name for name, group in studies(who.sex).items() if group in _LIVING and name != "zatsiorsky_seluyanov_1979"
     ]
-    own = [name for name in living if kind not in ("pelvis", "trunk_head") or name in _OWN_CUT]
+    own = [name for name in living if kind not in _TRUNK or name in ("chen_2011", "ma_2011", "pavol_2002")]
     masses = _studied(who.sex)
     return [one.segments[kind].mass for one in published_people(who.sex)] + [masses[name][kind] for name in own]
 
@@ -58,9 +57,6 @@ def _mean_fraction(kind: str, sex: Sex) -> tuple[float, float]:
     return float(np.mean(some)), float(np.std(some, ddof=1) / np.mean(some) / np.sqrt(len(some)))
 
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
-
-
 def stack_volume(level: Array, girth: Array, aspect: Array, *, length: float) -> float:
     """Return the volume, m³, of stadium-shaped sections stacked along a segment of ``length`` m.
 
@@ -71,11 +67,12 @@ def stack_volume(level: Array, girth: Array, aspect: Array, *, length: float) ->
     radius = np.asarray(girth) / (2 * np.pi + 4 * (np.asarray(aspect) - 1))
     ends = np.unique(np.concatenate([[0.0], level, [1.0]]))
     low, step = ends[:-1, None], np.diff(ends)[:, None]
-    # Gauss-Legendre nodes of every interval between sections.
-    place = (low + step * (1 + _NODES) / 2).ravel()
+    # Gauss-Legendre nodes of every interval between sections: exact to degree 5, sections have 4 along the axis.
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    place = (low + step * (1 + nodes) / 2).ravel()
     r, t = (np.interp(place, level, one) for one in (radius, (np.asarray(aspect) - 1) * radius))
     # Area of the two half circles and of the rectangle between them.
-    return float((step * _WEIGHTS / 2).ravel() * length @ (np.pi * r**2 + 4 * r * t))
+    return float((step * weights / 2).ravel() * length @ (np.pi * r**2 + 4 * r * t))
 
 
 _CONTRADICTION = 0.15  # Share of the body mass by which girths, or a scan, may miss it
@@ -223,15 +220,6 @@ def _area(outline: FootSizes, sex: Sex) -> float:
     return 0.5 * abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1)))
 
 
-_NEIGHBOURS = {
-    "hip": ("pelvis", "thigh"),
-    "knee": ("thigh", "shank"),
-    "ankle": ("shank", "foot"),
-    "shoulder": ("trunk_head", "upper_arm"),
-    "elbow": ("upper_arm", "forearm_hand"),
-}
-
-
 @dataclass(frozen=True, eq=False)
 class Opinion:
     """``value`` (n,) of the rows ``where`` (n,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (120,; kg, m, m²) of all
@@ -315,7 +303,9 @@ def _mass_noise(mass: Array, body: ScannedBody) -> Array:
     # Surface farther out by one error everywhere: all masses gain together.
     noise += error_size("scan_surface", "any") ** 2 * np.outer(surface, surface)
     alike = error_size("left_right_correlation", "mass")
-    for joint, neighbours in _NEIGHBOURS.items():
+    neighbours_at = {"hip": ("pelvis", "thigh"), "knee": ("thigh", "shank"), "ankle": ("shank", "foot")}
+    neighbours_at |= {"shoulder": ("trunk_head", "upper_arm"), "elbow": ("upper_arm", "forearm_hand")}
+    for joint, neighbours in neighbours_at.items():
         moved = np.zeros((len(SIDES), len(SEGMENTS)))  # kg that a cut moved by a metre gives to every segment
         for row, side in zip(moved, SIDES, strict=True):
             near, far = (SEGMENTS.index(kind if kind in _TRUNK else f"{side}_{kind}") for kind in neighbours)

@@ -12,7 +12,6 @@ from biodance.body.human.measures import Measures, StaticPosture, harrington_hip
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_limits, joint_tree, kind_of, widen_limits
 from biodance.body.human.static_centres import (
     LIMB_ENDS,
-    SIGN,
     UP,
     Centres,
     SegmentFrames,
@@ -24,15 +23,13 @@ from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
 from biodance.body.tables.error_sizes import error_size
 from biodance.lab.markers.sets import usual_places
+from biodance.lab.markers.upright import OUTWARDS
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.records.attention import Doubt
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import elementary_rotation, zxy_angles
 
-_THORAX = ("c7", "jugular_notch", "t10", "xiphoid")
 _ARM = ("upper_arm", "forearm_hand")
-_ARM_JOINTS = {side: (f"{side}_shoulder", f"{side}_elbow") for side in SIDES}
-"""The anatomical joints of an arm, held where it is not seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +76,7 @@ def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> 
             "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
             "the table. How arms swing is not in the simulated wrench."
         )
-    unseen += [joint for side in hidden for joint in _ARM_JOINTS[side]]
+    unseen += [f"{side}_{joint}" for side in hidden for joint in ("shoulder", "elbow")]
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
 
 
@@ -109,7 +106,7 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
         across = 2 * ((mark[f"{seen}_acromion"] - mark["jugular_notch"]) @ upright.right) * upright.right
         mark[f"{absent[0]}_acromion"] = mark[f"{seen}_acromion"] - across
         return [], [f"The {absent[0]} acromion has no marker: taken as the mirror image of the other."]
-    thorax = [name for name in _THORAX if name in mark]
+    thorax = [name for name in ("c7", "jugular_notch", "t10", "xiphoid") if name in mark]
     shoulders = upright.middle + upright.sizes["trunk_length"] * UP
     if thorax:
         shoulders = np.mean([mark[name] - upright.usual(name) for name in thorax], axis=0)
@@ -131,7 +128,7 @@ def _arm(mark: dict[str, Array], upright: _Upright, side: str, *, held: bool) ->
     if f"{side}_elbow_lateral" in mark and wrist and not held:
         mark |= {radial: mark.get(radial, wrist[0]), ulnar: mark.get(ulnar, wrist[0])}
         return False
-    out = SIGN[side] * upright.right
+    out = OUTWARDS[side] * upright.right
     under = upright.usual(f"{side}_acromion") @ UP
     elbow = mark[f"{side}_acromion"] - under * UP - upright.sizes["upper_arm_length"] * UP
     half = 0.15 * upright.sizes["upper_arm_length"]
@@ -159,10 +156,6 @@ _LENGTH_RATIO = {
     "trunk_head": (0.2, 0.36),
 }
 """of stature: the lengths that adults and children have."""
-
-_UNEQUAL = 2.0
-"""Standard deviations of the difference between a limb's sides beyond which its markers are doubted, as of any size
-that is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,7 +393,8 @@ def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[Doub
             )
         other = segment.replace("right_", "left_")
         more = skeleton.lengths[segment] - skeleton.lengths[other]
-        if kind_of(segment) in LIMB_ENDS and abs(more) > _UNEQUAL * centres.sides_sd(kind_of(segment)):
+        # Doubted beyond two standard deviations of the difference, as any size that is told.
+        if kind_of(segment) in LIMB_ENDS and abs(more) > 2.0 * centres.sides_sd(kind_of(segment)):
             how = f"is {1e3 * abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
             fact = f"the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}"
             notes.append(Doubt(fact, "Check the markers.", about=(segment, other)))

@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 
 
 class _Section(NamedTuple):
-    """The section of a body with a plane: ``area`` m², ``middle`` (3,) m its centroid."""
+    """The section of a body with a plane: ``middle`` (3,) m its centroid, ``normal`` (3,) of the plane, ``area`` m²; at
+    a joint the normal points towards the proximal side.
+    """
 
-    area: float
     middle: Array
+    normal: Array
+    area: float
 
 
 def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
@@ -82,7 +85,7 @@ def cut_section(triangles: Array, point: Array, normal: Array) -> _Section:
     area = float(twice.sum()) / 2
     # Centroid of a triangle at a third of its corners' sum (one is the origin): area times / 3, twice / 6.
     first = (twice @ arm.sum(axis=1)) / 6 if len(arm) else np.zeros(3)
-    return _Section(area, point + (first / area if area > 0 else 0.0))
+    return _Section(point + (first / area if area > 0 else 0.0), normal, area)
 
 
 def _heights(triangles: Array, point: Array, normal: Array) -> Array:
@@ -99,9 +102,6 @@ def _first(values: Array, marked: Array) -> Array:
 
 
 _TALL = 0.06  # Share by which a scan may be taller or smaller than the person: shoes, hair, a bent knee
-_UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
-_TURNED = {"z": "xyz", "y": "zxy", "x": "yzx"}
-"""By the axis that points up: axes of the file in the order ahead or sideways, ahead or sideways, up."""
 _FOOT, _ANKLE = 0.02, 0.07  # Of the stature: heights through the feet, and over them
 _AHEAD = 0.01  # Of the stature: the feet reach ahead of the ankles by at least this much on average
 
@@ -140,7 +140,8 @@ def read_scan(path: str, stature: float, up: str = "z") -> _Scan:
     except FileRefused as error:
         raise SessionRefused(f"[subject] scan: {error}") from error
     _refuse_open(path, mesh)
-    order = [("x", "y", "z").index(axis) for axis in _TURNED[up]]
+    # Axes of the file in the order ahead or sideways, ahead or sideways, up.
+    order = ["xyz".index(axis) for axis in {"z": "xyz", "y": "zxy", "x": "yzx"}[up]]
     corners = np.asarray(mesh.triangles)[:, :, order]
     corners = corners if mesh.volume > 0 else corners[:, ::-1]
     _refuse_height(path, np.ptp(corners.reshape(-1, 3), axis=0), stature, up, order)
@@ -164,7 +165,7 @@ def _refuse_height(path: str, extent: Array, stature: float, up: str, order: lis
     if abs(extent[2] / stature - 1) <= _TALL:
         return
     start = f"[subject] scan: {path} is {extent[2]:.3g} m tall along its axis {up}, the person {stature:.2f} m."
-    for unit, size in _UNITS.items():
+    for unit, size in {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}.items():
         if abs(extent[2] * size / stature - 1) <= _TALL:
             raise SessionRefused(f"{start} It looks like {unit}: export it in metres.")
     for k in (0, 1):
@@ -206,14 +207,6 @@ def _turned(path: str, corners: Array, stature: float) -> _Scan:
 _UP = np.array([0.0, 1.0, 0.0])
 TO_NECK = 0.16
 """Of the stature: from the vertex down to the middle of the neck, where the density changes."""
-_TILTS, _STEEPEST = 8, np.radians(35.0)
-"""Planes tried at a shoulder, up to this angle from the vertical."""
-_INSIDE, _PLACES = 0.04, 5
-"""Of the stature: how far inside the shoulder centre a plane may lie; how many places are tried."""
-_SHOULDER = 0.013  # Of the stature squared: a larger section through a shoulder cuts the trunk as well
-_THICK = 0.05
-"""Of the stature: flesh farther from the arm's axis towards the body is no arm: a broad hip."""
-_REACH = 0.15  # Share by which shoulder to finger tips may differ from the skeleton's arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,15 +219,6 @@ class ScannedBody:
     lumps: Mapping[str, RigidInertia]
     cuts: Mapping[str, float]
     surfaces: Mapping[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """A joint in the scan: ``place`` (3,) m, ``normal`` (3,) of its plane towards the proximal side, ``area`` m²."""
-
-    place: Array
-    normal: Array
-    area: float
 
 
 def cut_scan(scan: _Scan, skeleton: Skeleton) -> ScannedBody:
@@ -252,9 +236,9 @@ def cut_scan(scan: _Scan, skeleton: Skeleton) -> ScannedBody:
     middle = np.mean([hip for _, hip in hips.values()], axis=0) * [1, 1, 0]
     for side in SIDES:
         arm, rest, shoulder, elbow = _arm(scan, rest, skeleton, side, middle)
-        upper, fore = (clip_surface(arm, elbow.place, sign * elbow.normal) for sign in (1, -1))
-        lumps[f"{side}_upper_arm"] = _lump(upper, "upper_arm", shoulder.place, elbow.normal)
-        lumps[f"{side}_forearm_hand"] = _lump(fore, "forearm_hand", elbow.place, elbow.normal)
+        upper, fore = (clip_surface(arm, elbow.middle, sign * elbow.normal) for sign in (1, -1))
+        lumps[f"{side}_upper_arm"] = _lump(upper, "upper_arm", shoulder.middle, elbow.normal)
+        lumps[f"{side}_forearm_hand"] = _lump(fore, "forearm_hand", elbow.middle, elbow.normal)
         cuts |= {f"{side}_shoulder": _slope(shoulder, "upper_arm"), f"{side}_elbow": _slope(elbow, "upper_arm")}
     low, high = (clip_surface(rest, middle, sign * _UP) for sign in (-1, 1))
     for side, (ankle, hip) in hips.items():
@@ -295,9 +279,9 @@ def _leg(
     leg: Array, skeleton: Skeleton, side: str, ankle: Array, hip: Array, cuts: dict[str, float]
 ) -> dict[str, RigidInertia]:
     along = (hip - ankle) / np.linalg.norm(hip - ankle)
-    knee = _joint(leg, ankle + skeleton.lengths[f"{side}_shank"] * along, along)
-    low = _joint(leg, ankle, _UP)
-    thigh, below = (clip_surface(leg, knee.place, sign * along) for sign in (1, -1))
+    knee = cut_section(leg, ankle + skeleton.lengths[f"{side}_shank"] * along, along)
+    low = cut_section(leg, ankle, _UP)
+    thigh, below = (clip_surface(leg, knee.middle, sign * along) for sign in (1, -1))
     shank, foot = (clip_surface(below, ankle, sign * _UP) for sign in (1, -1))
     cuts |= {f"{side}_knee": _slope(knee, "thigh"), f"{side}_ankle": _slope(low, "shank")}
     whole = _lump(foot, "foot", ankle, _UP)
@@ -306,19 +290,15 @@ def _leg(
     spread = np.linalg.eigh(whole.inertia[np.ix_([0, 2], [0, 2])])[1][:, 0]
     c, s = spread * np.sign(spread[0] or 1.0)
     return {
-        f"{side}_thigh": _lump(thigh, "thigh", hip, hip - knee.place),
-        f"{side}_shank": _lump(shank, "shank", knee.place, knee.place - ankle),
+        f"{side}_thigh": _lump(thigh, "thigh", hip, hip - knee.middle),
+        f"{side}_shank": _lump(shank, "shank", knee.middle, knee.middle - ankle),
         f"{side}_foot": turn_inertia(whole, np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])),
     }
 
 
-def _joint(part: Array, place: Array, normal: Array) -> _Cut:
-    """Return the joint in the middle of the section through ``place`` (3,) m."""
-    section = cut_section(part, place, normal)
-    return _Cut(section.middle, normal, section.area)
-
-
-def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array) -> tuple[Array, Array, _Cut, _Cut]:
+def _arm(
+    scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array
+) -> tuple[Array, Array, _Section, _Section]:
     """Return the closed arm, the body without it, and its shoulder and elbow."""
     sign = side_of(f"{side}_thigh")
     up = np.array([0.0, middle[1] + skeleton.lengths["trunk_head"], 0.0])
@@ -335,28 +315,30 @@ def _arm(scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array)
     reach = float(np.linalg.norm(way))
     # From wrist to finger tips it is 0.108 of the stature (Winter 2009).
     whole = skeleton.lengths[f"{side}_upper_arm"] + skeleton.lengths[f"{side}_forearm_hand"] + 0.108 * skeleton.stature
-    if abs(reach / whole - 1) > _REACH:
+    if abs(reach / whole - 1) > 0.15:
         raise SessionRefused(
             f"[subject] scan: from the {side} shoulder to the farthest point sideways it is {reach:.2f} m, the "
             f"person's arm is {whole:.2f} m long. Scan with straight arms, 30 degrees away from the trunk."
         )
-    tilts = np.linspace(0.0, min(0.8 * angle, _STEEPEST), _TILTS)
-    places = shoulder - sign * np.linspace(0, _INSIDE * skeleton.stature, _PLACES)[:, None] * [0.0, 0.0, 1.0]
+    # Planes up to 35 degrees from the vertical, up to 0.04 of the stature inside the shoulder centre.
+    tilts = np.linspace(0.0, min(0.8 * angle, np.radians(35.0)), 8)
+    places = shoulder - sign * np.linspace(0, 0.04 * skeleton.stature, 5)[:, None] * [0.0, 0.0, 1.0]
     # Normal between straight sideways and tilted up by at most the steepest plane.
     planes = [(place, np.array([0.0, np.sin(tilt), sign * np.cos(tilt)])) for place in places for tilt in tilts]
     above = scan.triangles[scan.triangles[..., 1].max(axis=1) > middle[1]]
     areas = [cut_section(above, *plane).area for plane in planes]
     best = int(np.argmin(areas))
-    if areas[best] > _SHOULDER * skeleton.stature**2:
+    if areas[best] > 0.013 * skeleton.stature**2:  # a larger section cuts the trunk as well
         raise SessionRefused(_touching(side, f"the best cut at its shoulder is {1e4 * areas[best]:.0f} cm²"))
     place, plane = planes[best]
     beyond, body = (clip_surface(rest, place, turn * plane) for turn in (1, -1))
     outwards = np.array([0.0, np.sin(angle), sign * np.cos(angle)])
-    beside = shoulder - _THICK * skeleton.stature * outwards
+    # Flesh farther from the arm's axis towards the body is no arm: a broad hip.
+    beside = shoulder - 0.05 * skeleton.stature * outwards
     arm, hip = (clip_surface(beyond, beside, turn * outwards) for turn in (1, -1))
     body = np.concatenate([body, hip])
-    elbow = _joint(arm, shoulder + skeleton.lengths[f"{side}_upper_arm"] * along, -along)
-    return arm, body, _Cut(shoulder, -plane, max(areas[best], 1e-4)), elbow
+    elbow = cut_section(arm, shoulder + skeleton.lengths[f"{side}_upper_arm"] * along, -along)
+    return arm, body, _Section(shoulder, -plane, max(areas[best], 1e-4)), elbow
 
 
 def _touching(side: str, why: str) -> str:
@@ -371,8 +353,8 @@ def _trunk(
 ) -> dict[str, RigidInertia]:
     """Return pelvis and trunk: cut level where the tables cut, or at the joint where there is no such place."""
     to_cut = skeleton.cut.get("pelvis", skeleton.origins["trunk"])
-    cut = _joint(high, middle + skeleton.lengths["pelvis"] * _UP, _UP)
-    pelvis, trunk = (clip_surface(high, cut.place, sign * _UP) for sign in (-1, 1))
+    cut = cut_section(high, middle + skeleton.lengths["pelvis"] * _UP, _UP)
+    pelvis, trunk = (clip_surface(high, cut.middle, sign * _UP) for sign in (-1, 1))
     cuts["trunk"] = _slope(cut, "lower_trunk")
     neck = np.array([0.0, scan.height - TO_NECK * skeleton.stature, 0.0])
     joint = middle + np.linalg.norm(skeleton.origins["trunk"]) * _UP
@@ -388,7 +370,7 @@ def _density(part: str) -> float:
     return float(read_table("human", "densities").row(part=part)["density"])
 
 
-def _slope(cut: _Cut, part: str) -> float:
+def _slope(cut: _Section, part: str) -> float:
     return cut.area * _density(part)
 
 

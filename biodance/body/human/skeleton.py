@@ -22,13 +22,12 @@ from biodance.body.tables.anthropometry import (
     read_table,
     row_numbers,
 )
+from biodance.lab.markers.sets import MARKED_SEGMENTS
 from biodance.records import SIDES, Array, Subject
 from biodance.settings import STANDARD_GRAVITY
 
-SEGMENTS = (
-    *("pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head"),
-    *("right_upper_arm", "right_forearm_hand", "left_upper_arm", "left_forearm_hand"),
-)
+SEGMENTS = MARKED_SEGMENTS
+"""The segments of a person, in Body order."""
 JOINTS = (
     *("right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "trunk"),
     *("right_shoulder", "right_elbow", "left_shoulder", "left_elbow"),
@@ -140,8 +139,6 @@ def cut_at_joint(skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, cut={}, lengths={**lengths, "pelvis": pelvis}, stretched=stretched)
 
 
-_REFERENCE_MASS = {"F": 65.0, "M": 75.0}
-"""kg: the bodies for which joints_23.csv gives torques; other bodies in proportion to mass."""
 Range = Literal["anatomical", "comfortable"]
 
 # Anderson's joint and direction -> movement and sign in the model; the ankle flexes (dorsiflexion) upwards
@@ -176,7 +173,8 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
     anderson = read_table("human", "anderson_2007")
     young = replace(subject, age=25.0)
     ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
-    torque *= subject.mass / _REFERENCE_MASS[subject.sex] * float(np.mean(ratios))
+    # kg: the bodies for which the table gives torques
+    torque *= subject.mass / {"F": 65.0, "M": 75.0}[subject.sex] * float(np.mean(ratios))
     names = [row["joint"].split("_", 1)[1] for row in table.rows]
     for (joint, direction), (movement, sign) in _ANDERSON.items():
         peak = peak_torque(anderson, subject, joint, direction)
@@ -209,8 +207,6 @@ _BEYOND = np.radians(25.0)
 """rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
 in many places where the model has one joint, marker sets turn the axes, and skin slides.
 """
-_HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
-"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
 _SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
@@ -234,7 +230,8 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     lower, upper = (
         np.where(named("_shoulder_rotation"), *pair) for pair in ((-_HAND_TURN, lower), (_HAND_TURN, upper))
     )
-    free = _BEYOND * (1.0 - named(*_HELD))
+    # Hinges do not go further, nor does the shoulder's turn, as wide as the hand's.
+    free = _BEYOND * (1.0 - named("_knee_flexion", "_elbow_flexion", "_shoulder_rotation"))
     lower, upper = lower - free, upper + free
     low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
@@ -270,12 +267,8 @@ _NECK = 0.41
 women). Nodding is shared by all of the neck; about its base the head's weight would move twice as far as it does in
 virtual persons.
 """
-_STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
-"""Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
 OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
-_ACROMION = 0.5
-"""Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
 
 
 def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
@@ -323,8 +316,8 @@ def collar_bone(body: Body, side: str, markers: tuple[str, ...] = ()) -> Cut:
     assert middle is not None
     _, shoulder = body.place_on_segment(arm)
     outwards = [1.0, 1.0, 1.0 if side == "right" else -1.0]
-    # (3,) m in the trunk's frame.
-    place = np.asarray(middle + abs(float(shoulder[2])) * _STERNOCLAVICULAR * outwards)
+    # Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths.
+    place = np.asarray(middle + abs(float(shoulder[2])) * np.array([0.2, 0.0, 0.12]) * outwards)
     return Cut("trunk_head", f"{side}_clavicle", _axes("clavicle", side), place, np.zeros(10), markers, (arm,))
 
 
@@ -360,9 +353,9 @@ def _with_clavicle(body: Body, side: str) -> Body:
     if shoulders(body) is None:
         return body
     _, centre = body.place_on_segment(body.joint_index(f"{side}_shoulder_flexion"))
-    seen = _worn(
-        body, "trunk_head", np.linalg.norm(body.markers.position - centre, axis=1) < _ACROMION * abs(centre[2])
-    )
+    # Within a quarter of the shoulders' width, markers of the trunk ride on the collar bone.
+    near = np.linalg.norm(body.markers.position - centre, axis=1) < 0.5 * abs(centre[2])
+    seen = _worn(body, "trunk_head", near)
     return _ranged(with_part(body, collar_bone(body, side, seen))) if seen else body
 
 
@@ -412,17 +405,13 @@ def _ranged(body: Body) -> Body:
     rows = {row["joint"]: row for row in read_table("human", "optional_joints").rows}
     lower, upper, joints = np.array(body.limits.lower), np.array(body.limits.upper), list[Joint]()
     for i, joint in enumerate(body.joints):
-        row = rows.get(joint.name.removeprefix("right_").removeprefix("left_"))
+        row = rows.get(kind_of(joint.name))
         if row is not None:
             upper[i] = np.radians(float(row["range_deg"]))
             lower[i] = -upper[i]
             joint = replace(joint, positive=row["positive"])
         joints.append(joint)
     return replace(body, joints=tuple(joints), limits=replace(body.limits, lower=lower, upper=upper))
-
-
-_ARMS = ("upper_arm", "forearm_hand", "hand")
-_TRUNK = ("trunk_head", "clavicle")
 
 
 def marker_groups(body: Body) -> tuple[str, ...]:
@@ -436,5 +425,6 @@ def marker_groups(body: Body) -> tuple[str, ...]:
     for segment, height in zip(body.markers.segment, body.markers.position[:, 1], strict=True):
         kind = kind_of(body.links[segment])
         head = kind == "head" or (kind == "trunk_head" and height > neck)
-        groups.append("head" if head else "arms" if kind in _ARMS else "trunk" if kind in _TRUNK else "legs")
+        trunk, arms = kind in ("trunk_head", "clavicle"), kind in ("upper_arm", "forearm_hand", "hand")
+        groups.append("head" if head else "arms" if arms else "trunk" if trunk else "legs")
     return tuple(groups)

@@ -8,15 +8,13 @@ import numpy as np
 from biodance.body.human import measures
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.lab.markers.upright import OUTWARDS
 from biodance.records import Array
 from biodance.records.attention import Doubt
 from biodance.settings import Hip
 from biodance.spatial import elementary_rotation
 
-SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
-_WRIST_BAR = 0.03
-"""m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
 _AXIS_TOLERANCE = 30.0
 """deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
 LIMB_ENDS = {
@@ -64,7 +62,7 @@ class Centres:
 
     def sides_sd(self, limb: str) -> float:
         """Return the sd (m) of how much longer a ``limb`` is on the right: of people, and of joint centres."""
-        ends = (self.sd(f"{side}_{joint}") for side in SIGN for joint in LIMB_ENDS[limb])
+        ends = (self.sd(f"{side}_{joint}") for side in OUTWARDS for joint in LIMB_ENDS[limb])
         # Differences of lengths: people, and the four ends' centres, independent.
         return float(np.linalg.norm([error_size("side_length", "limb"), *ends]))
 
@@ -90,7 +88,7 @@ def static_centres(mark: _Places, sizes: measures.Measures, *, hip: Hip, trunk_f
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
     right, axis_sd, lateral, across, sole = {}, {}, {}, {}, {}
     notes: list[str] = []
-    for side, sign in SIGN.items():
+    for side, sign in OUTWARDS.items():
         knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
         notes += [note] if note else []
         place |= {
@@ -117,7 +115,7 @@ def hip_centres(place: _Places, sizes: measures.Measures, *, hip: Hip) -> tuple[
     rotation, middle = measures.pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
     legs = float(np.mean(list(sizes.leg_length.values())))
     centres = {}
-    for side, sign in SIGN.items():
+    for side, sign in OUTWARDS.items():
         local = (
             measures.harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
             if hip == "harrington"
@@ -138,13 +136,13 @@ def _shoulder_centres(place: _Places, sizes: measures.Measures, mid_hip: Array) 
     else:
         up = (right + left) / 2 - mid_hip
         forward = measures.unit(np.cross(up, right - left))
-    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
+    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in OUTWARDS}
     if "jugular_notch" not in place:
-        return {side: place[f"{side}_acromion"] - offset[side] * measures.unit(up) for side in SIGN}
+        return {side: place[f"{side}_acromion"] - offset[side] * measures.unit(up) for side in OUTWARDS}
     base = place["jugular_notch"] - sizes.marker_radius * forward
     return {
-        side: measures.shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side])
-        for side in SIGN
+        side: measures.shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=OUTWARDS[side])
+        for side in OUTWARDS
     }
 
 
@@ -165,11 +163,11 @@ def knee_centre(
     across = measures.unit(pelvis_right + foot_right)
     if f"{side}_knee_axis" in place:
         return measures.chord(hip, lateral, distance, place[f"{side}_knee_axis"]), ""
-    usual = measures.chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
+    usual = measures.chord(hip, lateral, distance, lateral + 0.1 * OUTWARDS[side] * across)
     if f"{side}_thigh_wand" not in place:
         return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
     centre = measures.chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
-    axis = SIGN[side] * (lateral - centre)
+    axis = OUTWARDS[side] * (lateral - centre)
     # Signed angle about the vertical between the horizontal parts of both axes.
     angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
     if abs(angle) <= _AXIS_TOLERANCE:
@@ -204,12 +202,12 @@ def arm_centres(place: _Places, sizes: measures.Measures, shoulder_at: Array, si
     if f"{side}_elbow_medial" in place:
         return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
     at = measures.elbow(
-        shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side]
+        shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=OUTWARDS[side]
     )
     reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
-    if np.linalg.norm(radial - ulnar) < 2 * reach + _WRIST_BAR:
+    if np.linalg.norm(radial - ulnar) < 2 * reach + 0.03:
         return at, middle
-    return at, measures.wrist(at, radial, ulnar, reach, side=SIGN[side])
+    return at, measures.wrist(at, radial, ulnar, reach, side=OUTWARDS[side])
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +236,7 @@ def segment_frames(centres: Centres) -> SegmentFrames:
     axis = shoulders - hips
     rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
     origin = {"pelvis": hips, "trunk_head": at["trunk"]}
-    for side in SIGN:
+    for side in OUTWARDS:
         for names, joints in (
             (("thigh", "shank"), ("hip", "knee", "ankle")),
             (("upper_arm", "forearm_hand"), ("shoulder", "elbow", "wrist")),
@@ -254,7 +252,7 @@ def segment_frames(centres: Centres) -> SegmentFrames:
             rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
         rotation[f"{side}_foot"] = frame_yz(centres.sole.get(side, UP), centres.across[side])
-    ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
+    ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in OUTWARDS}
     return SegmentFrames(rotation, origin, ends, hips + centres.cut * axis)
 
 

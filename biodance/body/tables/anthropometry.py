@@ -23,9 +23,9 @@ from biodance.library import locate, read_toml
 from biodance.records import Subject
 
 Sex = Literal["F", "M"]
-KINDS = ("pelvis", "thigh", "shank", "foot", "trunk_head", "upper_arm", "forearm_hand")
 COUNT = {"pelvis": 1, "thigh": 2, "shank": 2, "foot": 2, "trunk_head": 1, "upper_arm": 2, "forearm_hand": 2}
-"""How often each kind occurs in the body."""
+"""How often each kind of segment occurs in the body."""
+KINDS = tuple(COUNT)
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,37 +99,26 @@ def parts(sex: Sex) -> dict[str, RigidInertia]:
         "head": _down("head_2", sex, neck + length("head_2", sex)),
         "thigh": _down("thigh", sex, 0.0),
         "shank": _down("shank_2", sex, 0.0),
-        "foot": _foot(sex),
+        "foot": _down("foot", sex, 0.0),
         "upper_arm": _down("upper_arm", sex, 0.0),
         "forearm": _down("forearm", sex, 0.0),
         "hand": _down("hand", sex, -length("forearm", sex)),
     }
 
 
-def _sizes(segment: str, sex: Sex) -> tuple[float, float, float]:
-    """Return mass fraction, length m and CoM as a fraction of it."""
-    table = _shipped(BASE)
-    along = table.value(segment, "com", "longitudinal", sex=sex)
-    return table.value(segment, "mass", sex=sex), table.value(segment, "length", sex=sex), along
-
-
 def _down(segment: str, sex: Sex, top: float) -> RigidInertia:
-    """Return the lump of a segment whose origin is at height ``top`` m and whose end lies under it."""
-    mass, size, fraction = _sizes(segment, sex)
-    radii = np.array(_shipped(BASE).values(segment, "gyration", "sagittal longitudinal transverse", sex=sex)) * size
-    return RigidInertia(mass, np.array([0.0, top - fraction * size, 0.0]), mass * np.diag(radii**2))
-
-
-def _foot(sex: Sex) -> RigidInertia:
-    """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle."""
-    mass, size, fraction = _sizes("foot", sex)
-    radii = np.array(_shipped(BASE).values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
-    forward = (fraction - proportion("heel_behind_ankle", sex)) * size
-    return RigidInertia(
-        mass,
-        np.array([forward, -0.6 * proportion("ankle_height", sex) * _de_leva_stature(sex), 0.0]),
-        mass * np.diag(radii**2),
-    )
+    """Return the lump of a segment whose origin is at height ``top`` m and whose end lies under it; the foot's axis
+    points forwards, its CoM lies on the heel-toe line at 0.6 of the ankle's height under the ankle.
+    """
+    table, size = _shipped(BASE), length(segment, sex)
+    mass, fraction = (table.value(segment, *what, sex=sex) for what in (("mass",), ("com", "longitudinal")))
+    place, axes = np.array([0.0, top - fraction * size, 0.0]), "sagittal longitudinal transverse"
+    if segment == "foot":
+        under = -0.6 * proportion("ankle_height", sex) * _de_leva_stature(sex)
+        place = np.array([(fraction - proportion("heel_behind_ankle", sex)) * size, under, 0.0])
+        axes = "longitudinal sagittal transverse"
+    radii = np.array(table.values(segment, "gyration", axes, sex=sex)) * size
+    return RigidInertia(mass, place, mass * np.diag(radii**2))
 
 
 def dumas(subject: Subject) -> Reference:
@@ -175,65 +164,41 @@ def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
 
 
 def _winter(subject: Subject) -> Reference:
-    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, the trunk from Dumas 2018."""
+    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, the trunk from Dumas 2018.
+
+    The foot reaches from the malleolus to the second metatarsal head, that is forwards and down to the sole.
+    """
     sex, height, table = subject.sex, subject.stature, read_segment_table("winter_2009")
-    shape = dumas(subject)
+    shape, own, lumps = dumas(subject), parts(sex), {}
     scale = height / shape.stature
     lengths = {kind: scale * value for kind, value in shape.lengths.items()}
-    lumps = {kind: _winter_limb(kind, subject) for kind in ("thigh", "shank", "upper_arm", "forearm", "hand")}
+    for kind in ("thigh", "shank", "upper_arm", "forearm", "hand", "foot"):
+        mass, fraction, radius = (
+            table.value(kind, *what, sex=sex)
+            for what in (("mass",), ("com", "longitudinal"), ("gyration", "transverse"))
+        )
+        if kind == "foot":
+            foot = proportion("foot_length", sex) * height
+            ahead = (proportion("ball_from_heel", sex) - proportion("heel_behind_ankle", sex)) * foot
+            end, axis = np.array([ahead, -proportion("ankle_height", sex) * height, 0.0]), 0
+        else:
+            end, axis = np.array([0.0, -table.value(kind, "length", sex=sex) * height, 0.0]), 1
+        moments = np.full(3, float(radius * np.linalg.norm(end)) ** 2)
+        # De Leva's squared longitudinal radius of gyration, m², at the subject's stature.
+        moments[axis] = own[kind].inertia[axis, axis] / own[kind].mass * (height / _de_leva_stature(sex)) ** 2
+        lumps[kind] = RigidInertia(mass, fraction * end, mass * np.diag(moments))
     lengths |= {kind: table.value(kind, "length", sex=sex) * height for kind in ("thigh", "shank", "upper_arm")}
     lengths["forearm_hand"] = table.value("forearm", "length", sex=sex) * height
     hand = lumps.pop("hand")
     lumps["forearm_hand"] = combine_inertias(
         lumps.pop("forearm"), RigidInertia(hand.mass, hand.com - [0.0, lengths["forearm_hand"], 0.0], hand.inertia)
     )
-    names = ("pelvis", "abdomen", "thorax", "head_neck")
-    pelvis, *upper = (
-        _with_mass(part, table.value(name, "mass", sex=sex), scale)
-        for part, name in zip(_trunk_parts(sex), names, strict=True)
-    )
-    return normalised_person(
-        "winter_2009",
-        height,
-        lengths,
-        {"pelvis": pelvis, "trunk_head": combine_inertias(*upper), "foot": _winter_foot(subject), **lumps},
-    )
-
-
-def _winter_limb(kind: str, subject: Subject) -> RigidInertia:
-    mass, fraction, radius = _winter_sizes(kind, subject)
-    size = read_segment_table("winter_2009").value(kind, "length", sex=subject.sex) * subject.stature
-    across = (radius * size) ** 2
-    return RigidInertia(
-        mass, np.array([0.0, -fraction * size, 0.0]), mass * np.diag([across, _along(kind, subject), across])
-    )
-
-
-def _winter_sizes(kind: str, subject: Subject) -> tuple[float, float, float]:
-    """Return mass fraction, CoM and transverse radius of gyration as fractions of the length."""
-    table, sex = read_segment_table("winter_2009"), subject.sex
-    radius = table.value(kind, "gyration", "transverse", sex=sex)
-    return table.value(kind, "mass", sex=sex), table.value(kind, "com", "longitudinal", sex=sex), radius
-
-
-def _winter_foot(subject: Subject) -> RigidInertia:
-    """Return Winter's foot: from the malleolus to the second metatarsal head, that is forwards and down to the sole."""
-    mass, fraction, radius = _winter_sizes("foot", subject)
-    sex, size = subject.sex, proportion("foot_length", subject.sex) * subject.stature
-    toe = np.array([(proportion("ball_from_heel", sex) - proportion("heel_behind_ankle", sex)) * size, 0.0, 0.0])
-    toe[1] = -proportion("ankle_height", sex) * subject.stature
-    across = float((radius * np.linalg.norm(toe)) ** 2)
-    return RigidInertia(mass, fraction * toe, mass * np.diag([_along("foot", subject, 0), across, across]))
-
-
-def _along(part: str, subject: Subject, axis: int = 1) -> float:
-    """Return de Leva's squared longitudinal radius of gyration, m², at the subject's stature."""
-    lump, scale = parts(subject.sex)[part], subject.stature / _de_leva_stature(subject.sex)
-    return float(lump.inertia[axis, axis] / lump.mass * scale**2)
-
-
-def _with_mass(lump: RigidInertia, mass: float, scale: float) -> RigidInertia:
-    return RigidInertia(mass, scale * lump.com, scale**2 * mass / lump.mass * lump.inertia)
+    trunk = []
+    for part, name in zip(_trunk_parts(sex), ("pelvis", "abdomen", "thorax", "head_neck"), strict=True):
+        mass = table.value(name, "mass", sex=sex)
+        trunk.append(RigidInertia(mass, scale * part.com, scale**2 * mass / part.mass * part.inertia))
+    lumps |= {"pelvis": trunk[0], "trunk_head": combine_inertias(*trunk[1:])}
+    return normalised_person("winter_2009", height, lengths, lumps)
 
 
 def zatsiorsky(subject: Subject) -> Reference:
@@ -304,7 +269,6 @@ def study_masses(name: str, subject: Subject) -> dict[str, float]:
     return limbs | {"pelvis": pelvis, "trunk_head": above - pelvis}
 
 
-_AXES = "xyz"
 _FULL = 0.02  # How far the masses of a complete table may sum from the whole body, as a share
 
 
@@ -360,7 +324,7 @@ def _lump(
     stretch = length / base.lengths[kind]
     com, inertia = np.array(base.segments[kind].com) * stretch, np.array(base.segments[kind].inertia) * stretch**2
     wider = np.ones(3)
-    for i, axis in enumerate(_AXES):
+    for i, axis in enumerate("xyz"):
         if place := table.find(kind, "com", axis, sex=subject.sex):
             com[i] = place.of(subject) * (length if place.unit == "length" else 1.0)
         if radius := table.find(kind, "gyration", axis, sex=subject.sex):

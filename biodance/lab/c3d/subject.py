@@ -42,7 +42,6 @@ _MUSCLES: Mapping[str, str] = {
 """Muscle -> what laboratories call it, without side, spaces and signs; names after SENIAM (Hermens et al. 2000,
 doi:10.1016/S1050-6411(00)00027-4). What can mean two muscles (GM) is not among them.
 """
-_KNOWN = {short: muscle for muscle, names in _MUSCLES.items() for short in names.split()}
 _MILLIVOLTS = {"v": 1e3, "mv": 1.0, "uv": 1e-3, "µv": 1e-3, "μv": 1e-3}
 _SILENT = 0.02
 """Share of the file's strongest envelope under which nothing is connected: in 30 recordings of four laboratories empty
@@ -104,9 +103,10 @@ def muscle_of(label: str) -> tuple[str, str] | None:
     ``R_tibialis_anterior``); None for all other channels.
     """
     name = re.sub(r"(?i)emg", " ", label.rpartition(".")[2] or label).strip(" _-:")
+    known = {short: muscle for muscle, names in _MUSCLES.items() for short in names.split()}
     for pattern in (r"(?P<side>left|right|l|r)[\W_]*(?P<rest>.+)", r"(?P<rest>.+?)[\W_]+(?P<side>left|right|l|r)"):
         match = re.fullmatch(pattern, name, re.IGNORECASE)
-        muscle = _KNOWN.get(re.sub(r"[\W_]", "", match["rest"]).lower()) if match else None
+        muscle = known.get(re.sub(r"[\W_]", "", match["rest"]).lower()) if match else None
         if match and muscle:
             return muscle, "left" if match["side"].lower().startswith("l") else "right"
     return None
@@ -296,18 +296,15 @@ def _without_repeats(
     return sorted(kept), [kept[column] for column in sorted(kept)]
 
 
-_WHOLE = "Height MarkerDiameter InterAsisDistance PelvisLength"
+_PLAIN = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
+"""Measures that are no lengths, with the numbers that a person can have."""
 _OF_A_SIDE = (
     "LegLength KneeWidth AnkleWidth ShoulderOffset ElbowWidth WristWidth HandThickness AsisTrocanterDistance "
     "FemurLength TibiaLength FootLength SoleDelta"
 )
-_LENGTHS = (*_WHOLE.split(), *(side + name for side in "LR" for name in _OF_A_SIDE.split()))
-_OTHER_NAMES = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
-_PLAIN = ("Bodymass", "age", "gender")
-_LEGAL = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
-_STATURE, _LEG = (0.4, 2.6), (0.2, 1.4)
-_SCALES = (1e-3, 1.0, 1e-2)
-_NAMES = {name.upper(): name for name in (*_LENGTHS, *_PLAIN)}
+_MEASURES = ("Height", "MarkerDiameter", "InterAsisDistance", "PelvisLength", *_PLAIN)
+_NAMES = {name.upper(): name for name in (*_MEASURES, *(side + name for side in "LR" for name in _OF_A_SIDE.split()))}
+"""Every measure by its name in upper case."""
 
 
 def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
@@ -320,22 +317,20 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     known = {_NAMES[name]: value for name, value in _written(raw).items() if name in _NAMES}
     written = {name: value for name, value in known.items() if value != 0 and not math.isnan(value)}
     # metres per unit by which stature, else a leg, is a person's; mm if neither is there
-    lengths = (("Height", _STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG))
-    ranges = [(written[name], *legal) for name, legal in lengths if name in written]
-    scale = next((s for value, low, high in ranges for s in _SCALES if low <= value * s <= high), _SCALES[0])
+    stature, units = (0.4, 2.6), {1e-3: "mm", 1.0: "m", 1e-2: "cm"}
+    lengths = {"Height": stature, "LLegLength": (0.2, 1.4), "RLegLength": (0.2, 1.4)}
+    ranges = [(written[name], *legal) for name, legal in lengths.items() if name in written]
+    scale = next((s for value, low, high in ranges for s in units if low <= value * s <= high), 1e-3)
     warnings: list[str] = []
     measures: dict[str, float] = {}
     for name, value in written.items():
-        low, high = _LEGAL.get(name, (-0.1, _STATURE[1]))
+        low, high = stature if name == "Height" else _PLAIN.get(name, (-0.1, stature[1]))
         value = value if name in _PLAIN else value * scale
-        if name == "Height":
-            low, high = _STATURE
         if low <= value <= high:
             measures[name] = value
         else:
             warnings.append(f"The file says {name} = {written[name]:g}, which a person cannot have; it was left out.")
-    unit = {1e-3: "mm", 1e-2: "cm", 1.0: "m"}[scale]
-    sized = f", lengths in {unit}" if measures.keys() - {*_PLAIN} else ""
+    sized = f", lengths in {units[scale]}" if measures.keys() - {*_PLAIN} else ""
     said = f"{len(measures)} measures of the subject read from the file{sized}."
     return measures, (said,) if measures else (), tuple(warnings)
 
@@ -348,6 +343,7 @@ def as_written(measures: Mapping[str, float]) -> dict[str, float]:
 def _written(raw: RawC3d) -> dict[str, float]:
     """Return all single numbers of the groups by upper-case name, as written."""
     found: dict[str, float] = {}
+    other = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
     for group in ("PROCESSING", "SUBJECTS", "SUBJECT"):
         listed = zip(
             texts(raw.parameters, group, "LABELS"), parameter_numbers(raw.parameters, group, "VALUES"), strict=False
@@ -356,5 +352,5 @@ def _written(raw: RawC3d) -> dict[str, float]:
         pairs = [*listed, *((name, values[0]) for name, values in direct if values.size == 1)]
         for name, value in pairs:
             key = name.upper().replace("_", "").replace(" ", "").lstrip("$")
-            found.setdefault(_OTHER_NAMES.get(key, key), float(value))
+            found.setdefault(other.get(key, key), float(value))
     return found

@@ -23,12 +23,6 @@ _MOST = 255  # The longest dimension of a parameter: one byte tells it
 _MM = 1000.0
 _CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
-_NAMES = {
-    1: ("Fx", "Fy", "Fz", "Px", "Py", "Mz"),
-    2: ("Fx", "Fy", "Fz", "Mx", "My", "Mz"),
-    3: ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
-    4: ("V1", "V2", "V3", "V4", "V5", "V6"),
-}
 _DISK = {"F": (1.0, "N"), "L": (_MM, "mm"), "M": (_MM, "Nmm"), "V": (1.0, "V")}
 
 
@@ -176,10 +170,16 @@ def _point_group(markers: Markers | None, rate: float, frames: int) -> dict[str,
 
 
 def _analog_group(plates: Sequence[PlateRecording], rate: float) -> dict[str, FileValue]:
+    names = {
+        1: "Fx Fy Fz Px Py Mz",
+        2: "Fx Fy Fz Mx My Mz",
+        3: "Fx12 Fx34 Fy14 Fy23 Fz1 Fz2 Fz3 Fz4",
+        4: "V1 V2 V3 V4 V5 V6",
+    }
     labels = [
         label
         for number, plate in enumerate(plates, start=1)
-        for label in plate.labels or [f"{name}{number}" for name in _NAMES[plate.type]]
+        for label in plate.labels or [f"{name}{number}" for name in names[plate.type].split()]
     ]
     count = len(labels)
     return {

@@ -156,8 +156,6 @@ def _mirrored(every: Mapping[str, Iterable[_Spelled]]) -> dict[tuple[str, str, s
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
 _UNPAIRED = ("pelvis", "trunk_head")
 """Segments that have no side."""
-_JOINTS = ("hip", "knee", "ankle")
-"""Joints whose bare names stand on both sides in every skeleton of video: HALPE, COCO, OpenPose, BlazePose."""
 
 
 @dataclass(frozen=True)
@@ -230,7 +228,8 @@ def joints_from_video(labels: Iterable[str]) -> tuple[str, ...]:
         return ()
     said = {label: (one.side, "".join(one.rest)) for label, ways in _read(labels).items() for one in ways if one.side}
     plain, by_word = plain_labels(labels), {word: label for label, word in said.items()}
-    wanted = [(side, joint) for joint in _JOINTS for side in SIDES]
+    # Bare names that stand on both sides in every skeleton of video: HALPE, COCO, OpenPose, BlazePose.
+    wanted = [(side, joint) for joint in ("hip", "knee", "ankle") for side in SIDES]
     return tuple(plain[by_word[one]] for one in wanted) if by_word.keys() >= set(wanted) else ()
 
 
@@ -260,18 +259,14 @@ def _read(labels: tuple[str, ...], sides: tuple[tuple[str, str], ...] = ()) -> M
 def _meanings(ways: Iterable[_Spelled]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
     for way in ways:
-        for place, rank in _places(way.rest, way.side):
-            found[place] = min(found.get(place, 10**6), rank + way.cost)
+        # As it is spelled; where that says nothing, without the number behind it.
+        stem = tuple(filter(None, (*way.rest[:-1], way.rest[-1].rstrip("0123456789"))))
+        places, more = _spelled(way.rest, way.side), 0
+        if not places and stem and stem != way.rest:
+            places, more = _spelled(stem, way.side), 70
+        for place, rank in places:
+            found[place] = min(found.get(place, 10**6), rank + more + way.cost)
     return tuple(sorted((Meaning(place, rank) for place, rank in found.items()), key=lambda one: one.rank))
-
-
-def _places(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
-    """Return the places of one reading: a landmark that the tokens spell in some order, else a segment."""
-    found = _spelled(rest, side)
-    stem = (*rest[:-1], rest[-1].rstrip("0123456789"))
-    if not found and stem != rest and any(stem):
-        found = [(place, rank + 70) for place, rank in _spelled(tuple(filter(None, stem)), side)]
-    return found
 
 
 def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:

@@ -27,29 +27,24 @@ MARKED_SEGMENTS = (
 )
 """The 12 segments that a marker can sit on."""
 
-_SIDED = (
-    "asis psis hip_centre knee_lateral knee_medial ankle_lateral ankle_medial thigh_wand shank_wand knee_axis heel toe "
-    "toe_lateral toe_medial acromion elbow_lateral elbow_medial wrist_radial wrist_ulnar hand"
-)
-LANDMARKS = (
-    *(f"{side}_{name}" for side in SIDES for name in _SIDED.split()),
-    *("mid_psis", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"),
-)
+_SIDED = {
+    **dict.fromkeys(("asis", "psis", "hip_centre"), "pelvis"),
+    **dict.fromkeys(("knee_lateral", "knee_medial"), "thigh"),
+    **dict.fromkeys(("ankle_lateral", "ankle_medial"), "shank"),
+    **{"thigh_wand": "thigh", "shank_wand": "shank", "knee_axis": "thigh"},
+    **dict.fromkeys(("heel", "toe", "toe_lateral", "toe_medial"), "foot"),
+    **{"acromion": "trunk_head", "elbow_lateral": "upper_arm", "elbow_medial": "upper_arm"},
+    **dict.fromkeys(("wrist_radial", "wrist_ulnar", "hand"), "forearm_hand"),
+}
+_SINGLE = {
+    "mid_psis": "pelvis",
+    **dict.fromkeys(("c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"), "trunk_head"),
+}
+"""Landmarks that each side has, and single ones, with the segment that a marker on them sits on."""
+LANDMARKS = (*(f"{side}_{name}" for side in SIDES for name in _SIDED), *_SINGLE)
 """The anatomical landmarks that joint centres, scaling and contact ask for."""
 MIDLINE = ("mid_psis", "head_front", "head_back")
 """Landmarks that may be the mean of several markers in a map."""
-
-_MARKED = {
-    "pelvis": "asis psis hip_centre mid_psis",
-    "thigh": "knee_lateral knee_medial thigh_wand knee_axis",
-    "shank": "ankle_lateral ankle_medial shank_wand",
-    "foot": "heel toe toe_lateral toe_medial",
-    "trunk_head": "acromion c7 t10 jugular_notch xiphoid head_front head_back",
-    "upper_arm": "elbow_lateral elbow_medial",
-    "forearm_hand": "wrist_radial wrist_ulnar hand",
-}
-_SEGMENT_OF = {landmark: segment for segment, some in _MARKED.items() for landmark in some.split()}
-"""The segment that a marker on a landmark sits on, without its side."""
 
 _NORMALISERS = "asis_width foot_length thigh_length shank_length upper_arm_length forearm_length trunk_length stature"
 """Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid
@@ -200,8 +195,7 @@ def parse_map(given: Mapping[str, Any], path: str) -> MarkerSet:
 
 def segment_of(landmark: str) -> str:
     """Return the segment that a marker on a landmark sits on."""
-    side, _, part = landmark.rpartition("_") if landmark.startswith("mid") else landmark.partition("_")
-    segment = _SEGMENT_OF.get(landmark) or _SEGMENT_OF[part]
+    side, segment = landmark.partition("_")[0], (_SIDED | _SINGLE)[part_of(landmark)]
     return f"{side}_{segment}" if f"{side}_{segment}" in MARKED_SEGMENTS else segment
 
 

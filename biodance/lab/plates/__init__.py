@@ -64,24 +64,19 @@ PLATE_TYPES = {
 """The TYPEs of the C3D standard that can be computed."""
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
-_AROUND_NAMES = re.compile(r"force|moment|torque|[\s._+:-]", flags=re.IGNORECASE)
-_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
-_WORDS = {"F": "force", "M": "moment", "L": "length"}
 
-POUND, _KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
+POUND, INCH = 4.4482216152605, 0.0254
 FORCE = {
     **dict.fromkeys(("n", "newton", "newtons", "nt"), 1.0),
     "kn": 1000.0,
     **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), POUND),
-    **dict.fromkeys(("kgf", "kp"), _KILOGRAM_FORCE),
+    **dict.fromkeys(("kgf", "kp"), STANDARD_GRAVITY),
 }
 _LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
 MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
     length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"
 }
 """N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
-_TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
-
 
 C3D_ONLY = ("type", "channels", "sensitivity", "origin_m")
 """What of a plate only a reader of its channels can follow."""
@@ -406,7 +401,7 @@ def _unit_factors(
     """Return the SI unit per unit of each channel (after the calibration matrix), and what was decided."""
     content = PLATE_TYPES[kind].content
     listed = ", ".join(dict.fromkeys(unit or "(none)" for unit in units))
-    assumed = {"F": 1.0, "M": metres, "L": metres}
+    assumed, tables = {"F": 1.0, "M": metres, "L": metres}, {"F": FORCE, "M": MOMENT, "L": _LENGTH}
     if told.sensitivity is not None:
         given = f"Units: channels in {listed} times the sensitivity in session.toml give N and N·m."
         return (1.0,) * len(content), (given,)
@@ -415,13 +410,13 @@ def _unit_factors(
         return tuple(assumed[what] for what in content), (said,)
     factors, strange = [], {}
     for what, unit in zip(content, units, strict=True):
-        known = _TABLES[what].get(plain_unit(unit))
+        known = tables[what].get(plain_unit(unit))
         factors.append(assumed[what] if known is None else known)
         if known is None:
             strange[what] = unit
-    taken = {"F": "N", "M": f"N x {metres:g} m", "L": f"{metres:g} m"}
+    taken = {"F": ("force", "N"), "M": ("moment", f"N x {metres:g} m"), "L": ("length", f"{metres:g} m")}
     doubts = (
-        f"Unit {unit!r} of a {_WORDS[what]} channel says nothing; it was taken as {taken[what]}."
+        f"Unit {unit!r} of a {taken[what][0]} channel says nothing; it was taken as {taken[what][1]}."
         for what, unit in strange.items()
     )
     return tuple(factors), (f"Units: {listed}.", *doubts)
@@ -436,7 +431,8 @@ def channel_groups(labels: Sequence[str]) -> tuple[tuple[int, ...], ...]:
     for parts, pattern in ((_EIGHT, r"(f[xy](?:12|34|14|23)|fz[1-4])"), (_SIX, r"([fm][xyz])")):
         plates: dict[str, dict[str, int]] = {}
         for column, label in enumerate(labels):
-            match = re.fullmatch(rf"(.*?){pattern}(\D?\d*)", _AROUND_NAMES.sub("", label).lower())
+            plain = re.sub(r"force|moment|torque|[\s._+:-]", "", label, flags=re.IGNORECASE).lower()
+            match = re.fullmatch(rf"(.*?){pattern}(\D?\d*)", plain)
             if match and not any(column in group for group in found):
                 plates.setdefault(match[1] + "|" + match[3], {}).setdefault(match[2], column)
         found += [tuple(columns[part] for part in parts) for columns in plates.values() if set(parts) <= set(columns)]
@@ -450,7 +446,8 @@ def _undescribed_plates(raw: RawC3d) -> tuple[str, ...]:
         return ()
     columns = [column for group in groups for column in group]
     units = ", ".join(dict.fromkeys(raw.analog_units[column] or "no unit" for column in columns))
-    count = _NUMBERS[len(groups)] if len(groups) < len(_NUMBERS) else str(len(groups))
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+    count = words[len(groups)] if len(groups) < len(words) else str(len(groups))
     names = f"{raw.analog_labels[columns[0]]} ... {raw.analog_labels[columns[-1]]}, in {units}"
     said = (
         f"{len(columns)} channels ({names}) look like {count} force plate{'s' * (len(groups) > 1)}, which the file "

@@ -6,6 +6,7 @@ Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Vi
 types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,24 +29,6 @@ _NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence
 FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
 
 
-@dataclass(frozen=True)
-class Decisions:
-    """What was decided about a plate, step by step, from session.toml to its zero."""
-
-    told: tuple[str, ...] = ()
-    corners: tuple[str, ...] = ()
-    origin: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    gaps: tuple[str, ...] = ()
-    load: tuple[str, ...] = ()
-    zero: tuple[str, ...] = ()
-
-    @property
-    def all(self) -> tuple[str, ...]:
-        """Every sentence, in the order of the steps."""
-        return (*self.told, *self.corners, *self.origin, *self.units, *self.gaps, *self.load, *self.zero)
-
-
 @dataclass(frozen=True, eq=False)
 class PlateReading:
     """A plate whose directions are not yet decided.
@@ -55,7 +38,8 @@ class PlateReading:
     taken off; ``vector`` (3,) m from the sensor to the centre of the surface, plate axes, as the file says; ``rate`` Hz
     of the samples; ``empty`` (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded;
     ``known`` (S,) False where a channel holds no number: ``sensor`` then keeps the nearest known sample, for decisions
-    only; ``decisions`` what was decided; ``warnings`` what a person should look at, beside odd corners, origins, gaps.
+    only; ``decisions`` what was decided, by the step (told, corners, origin, units, gaps, load, zero), in this order;
+    ``warnings`` what a person should look at, beside odd corners, origins, gaps.
     """
 
     plate: PlateParameters
@@ -67,7 +51,7 @@ class PlateReading:
     rate: float
     empty: Array
     known: Mask
-    decisions: Decisions
+    decisions: Mapping[str, tuple[str, ...]]
     warnings: tuple[str, ...] = ()
 
     @property
@@ -136,7 +120,8 @@ def decode_plate(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array
     empty = sensor_wrench(kind, in_si(offsets[None]), origin)[0, :3]
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
-    said = Decisions((first, *told), corners_said, origin_said, plate.units_said, gaps_said, (), (zero.said,))
+    said = {"told": (first, *told), "corners": corners_said, "origin": origin_said, "units": plate.units_said}
+    said |= {"gaps": gaps_said, "load": (), "zero": (zero.said,)}
     axes = plate_axes(corners)
     return PlateReading(plate, corners, axes, half, sensor, vector, raw.analog_rate, empty, known, said)
 

@@ -121,7 +121,7 @@ def _without_offset(reading: PlateReading, elsewhere: float) -> PlateReading:
         return reading
     zero = reading.sensor[reading.known].mean(axis=0)
     said = f"Zero: no foot is ever on the plate, so the constant {level:.3g} N that it reads was subtracted."
-    decisions = replace(reading.decisions, zero=(said,))  # instead of the sentence that no zero was found
+    decisions = {**reading.decisions, "zero": (said,)}  # instead of the sentence that no zero was found
     return replace(reading, sensor=reading.sensor - zero, empty=reading.empty + zero[:3], decisions=decisions)
 
 

@@ -4,6 +4,7 @@ and with them the wrench in the lab. What the plate carries decides: weight, swa
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -121,7 +122,7 @@ def _with_origin_turned(reading: PlateReading, loaded: Mask) -> PlateReading:
         f"ORIGIN x, y of ({1000 * x:.4g}, {1000 * y:.4g}) mm put {100 * written:.0f} % of the load on "
         f"the plate, turned round {100 * turned:.0f} %: they were turned."
     )
-    decisions = replace(reading.decisions, origin=(*reading.decisions.origin, said))
+    decisions = {**reading.decisions, "origin": (*reading.decisions["origin"], said)}
     return replace(reading, vector=vector, decisions=decisions)
 
 
@@ -158,7 +159,7 @@ def _with_moments_in_unit(reading: PlateReading, loaded: Mask) -> PlateReading:
         said, sensor = f"{only}.", reading.sensor
         check = f"{only}: check its CORNERS, ORIGIN, units and whether somebody pushed it sideways."
     warnings = (f"Plate {plate.number}: {check}",) if check else ()
-    return replace(reading, sensor=sensor, decisions=replace(reading.decisions, load=(said,)), warnings=warnings)
+    return replace(reading, sensor=sensor, decisions={**reading.decisions, "load": (said,)}, warnings=warnings)
 
 
 def _share_on_plate(reading: PlateReading) -> float:
@@ -338,10 +339,10 @@ def _in_lab(
     zero = (sign or otherwise) * reading.axes @ reading.empty
     plate, steps = reading.plate, reading.decisions
     where = (plate.name, plate.type, reading.corners, Wrench(time, value))
-    done = Plate(*where, (*steps.all, *told), zero, foot=plate.told.foot)
+    done = Plate(*where, (*chain(*steps.values()), *told), zero, foot=plate.told.foot)
     odd_said, more = (
         tuple(f"Plate {plate.number}: {one}" for one in some)
-        for some in ((*steps.corners, *steps.origin, *steps.gaps), doubts)
+        for some in (chain(*(steps[step] for step in ("corners", "origin", "gaps"))), doubts)
     )
     return done, (*odd_said, *reading.warnings, *more), fz_alone
 

@@ -20,9 +20,6 @@ NAME = "AMTI text"
 EXTENSIONS = (".asc", ".txt", ".csv")
 PREFERENCE = 90
 """Asked last: any table of numbers looks like this format."""
-_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
-_CELL = rf"(?:{_NUMBER}|nan)"
-_ROW = re.compile(rf"\s*{_CELL}(?:[\s,;]+{_CELL}){{5,}}[\s,;]*", flags=re.IGNORECASE)
 
 
 def sniff(head: bytes) -> bool:
@@ -30,7 +27,9 @@ def sniff(head: bytes) -> bool:
     one may be damaged, which is for `read` to say.
     """
     rows = [line for line in head_text(head).splitlines()[:4] if line.strip()]
-    fit = [bool(_ROW.fullmatch(line)) for line in rows[1:] or rows]
+    cell = r"(?:[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?|nan)"
+    row = re.compile(rf"\s*{cell}(?:[\s,;]+{cell}){{5,}}[\s,;]*", flags=re.IGNORECASE)
+    fit = [bool(row.fullmatch(line)) for line in rows[1:] or rows]
     return any(fit) and sum(fit) >= len(fit) - (len(fit) > 2)
 
 

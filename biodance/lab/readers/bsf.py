@@ -45,7 +45,6 @@ INSTRUMENT = _layout(
     "timing f4 5, zero i4 32, rate i4, trigger f4, end f4"
 )
 _SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
-_IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
 _MOST_PLATES = 16
 
 
@@ -62,7 +61,7 @@ def _load(block: NDArray[Any], header: Any, version: int, where: str) -> Array:
             )
         # Counts over counts a volt and gain: volts of the bridge; the sensitivity is µV per volt of excitation a unit.
         factor = 1e6 / product
-    return block.astype(float) * factor * _IMPERIAL
+    return block.astype(float) * factor * np.array([POUND] * 3 + [POUND * INCH] * 3)
 
 
 def _main_header(content: bytes, path: Path) -> Any:

@@ -18,10 +18,6 @@ from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import COP_FORCE
 from biodance.spatial import turned_wrench, wrench_about_origin
 
-_NOT_PLACED = (
-    "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to "
-    "spare."
-)
 _AXES = "xyz"
 _TURNED_BY = 0.1
 """m: moment along the force, as a share of the force, that no ground gives: friction of the whole force (coefficient
@@ -109,7 +105,11 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
                 f"say where it lies."
             )
             continue
-        said, zero = (f"Columns of {name}.", *one.said, *decided, _NOT_PLACED), sign * turn @ one.zero
+        around = (
+            "The file does not say where the plate lies: its corners enclose the centres of pressure under load with "
+            "0.15 m to spare."
+        )
+        said, zero = (f"Columns of {name}.", *one.said, *decided, around), sign * turn @ one.zero
         corners = around_pressures(cop, height)
         plates.append(Plate(f"plate{number}", 0, corners, wrench, said, zero, placed=False, columns=name))
     return tuple(plates), tuple(history), warnings

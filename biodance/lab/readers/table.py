@@ -47,9 +47,6 @@ _TIME = re.compile(
     r"(?:[\s_.]*(s|secs?|seconds?|ms|msecs?|milliseconds?|us|µs|ns))?",
     flags=re.IGNORECASE,
 )
-_BEHIND = re.compile(r"(.+?)[\s_.:\-]*([xyz])(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
-_BEFORE = re.compile(r"([xyz])[\s_.:\-]+(.+?)(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
-_TURNED = re.compile(r"(force|moment|torque)[\s_.]*([xyz])|(?<![A-Za-z])(t)([xyz])(?![a-z])", flags=re.IGNORECASE)
 FEWEST_MARKERS = 3
 """Markers that a table must hold: fewer have no frame."""
 
@@ -75,13 +72,15 @@ def columns_in(labels: Sequence[str]) -> TableColumns:
     times = ((k, match[1] or "") for k, label in enumerate(labels) if (match := _TIME.fullmatch(label)))
     time, unit = next(times, (None, ""))
     # Force_X_1 is FX_1, Tz is Mz
+    turned = re.compile(r"(force|moment|torque)[\s_.]*([xyz])|(?<![A-Za-z])(t)([xyz])(?![a-z])", flags=re.IGNORECASE)
     forces = [
-        _TURNED.sub(lambda m: ("F" if (m[1] or "").lower() == "force" else "M") + (m[2] or m[4]), x) for x in labels
+        turned.sub(lambda m: ("F" if (m[1] or "").lower() == "force" else "M") + (m[2] or m[4]), x) for x in labels
     ]
     plates = tuple(group for group in channel_groups(forces) if len(group) == 6)
     taken = {time, *chain(*plates)}
     free = [k for k in range(len(labels)) if k not in taken]
-    behind, before = (_triples(labels, free, pattern, axis) for pattern, axis in ((_BEHIND, 2), (_BEFORE, 1)))
+    behind = _triples(labels, free, r"(.+?)[\s_.:\-]*([xyz])", 2)
+    before = _triples(labels, free, r"([xyz])[\s_.:\-]+(.+?)", 1)
     found, length = max((behind, before), key=lambda notation: len(_with_all_axes(notation[0])))
     markers = _with_all_axes(found)
     broken = tuple(name for name, axes in found.items() if len(axes) == 2)
@@ -96,13 +95,13 @@ def _with_all_axes(found: Mapping[str, Mapping[str, int]]) -> dict[str, tuple[in
 
 
 def _triples(
-    labels: Sequence[str], free: Sequence[int], pattern: re.Pattern[str], axis: int
+    labels: Sequence[str], free: Sequence[int], pattern: str, axis: int
 ) -> tuple[dict[str, dict[str, int]], str]:
     """Return the columns of each marker by axis, and the unit of length of the labels."""
     found: dict[str, dict[str, int]] = {}
     units = set()
     for k in free:
-        if match := pattern.fullmatch(labels[k]):
+        if match := re.fullmatch(rf"{pattern}(?:[\s_.]+(mm|cm|m))?", labels[k], flags=re.IGNORECASE):
             found.setdefault(match[3 - axis].strip(), {}).setdefault(match[axis].lower(), k)
             units.add((match[3] or "").lower())
     return found, units.pop() if len(units) == 1 else ""

@@ -23,13 +23,11 @@ from biodance.errors import BiodanceError, FileRefused, SessionRefused
 from biodance.lab.plain_text import COMMAS_READ, decode, parse_number, read_bytes, read_text
 from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
-from biodance.lab.session.subject import declared_mass, declared_stature
+from biodance.lab.session.subject import declared
 from biodance.records import Role, Trial, grouped
 from biodance.records.attention import Doubt
 
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
-_NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
-_SIDE = re.compile(r"^(Left|Right)(?=[A-Z])")
 
 
 def read_mp(path: str | Path) -> dict[str, float]:
@@ -140,8 +138,9 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
     """Return lengths (m) and masses (kg) by the names of the PROCESSING group, no angles, flags and zeros."""
     measures: dict[str, float] = {}
     for name, value in values.items():
-        short = _SIDE.sub(lambda side: side[1][0], name)
-        if value == 0 or ANGLES.search(short) or _NOT_MEASURES.search(short):
+        short = re.sub(r"^(Left|Right)(?=[A-Z])", lambda side: side[1][0], name)
+        none = re.search(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", short, flags=re.IGNORECASE)
+        if value == 0 or ANGLES.search(short) or none:
             continue
         measures[short] = value if short.lower() == "bodymass" else value * 1e-3
     return measures
@@ -289,8 +288,8 @@ def _beside(file: Path, readers: Chosen[Reader]) -> Path | None:
 
 ANOTHER_STATURE = 1.04
 """Ratio of two statures from which on they are of two people, or of one who grew."""
-_PEOPLE = ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", ANOTHER_STATURE))
-"""What files declare of a person: reader, name, unit, and from which ratio on it is somebody else's."""
+_PEOPLE = (("mass", "kg", 1.1), ("stature", "m", ANOTHER_STATURE))
+"""What files declare of a person: name, unit, and from which ratio on it is somebody else's."""
 
 
 def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
@@ -322,12 +321,12 @@ def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Tr
     if static is None:
         return list(trials), {}
     strangers: dict[str, str] = {}
-    for (said, of, unit, alike), known in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
-        right = said(static.measurements)
+    for (of, unit, alike), known in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
+        right = declared(static.measurements, of)
         if known is not None or not math.isfinite(right):
             continue
         for trial in trials:
-            value = said(trial.measurements)
+            value = declared(trial.measurements, of)
             if max(value / right, right / value) > alike:
                 strangers.setdefault(
                     trial.source.path.name,
@@ -373,10 +372,10 @@ def refuse_several_people(folder: Path, trials: Sequence[Trial], typed: SubjectE
     """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people;
     what was ``typed`` in session.toml is believed of all of them.
     """
-    for (said, of, unit, alike), told in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
+    for (of, unit, alike), told in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
         if told is not None:
             continue
-        values = ((trial.source.path.parent, said(trial.measurements)) for trial in trials)
+        values = ((trial.source.path.parent, declared(trial.measurements, of)) for trial in trials)
         parts = grouped((part, value) for part, value in values if math.isfinite(value))
         known = sorted((median(values), part.name) for part, values in parts.items())
         if known and known[-1][0] > alike * known[0][0]:

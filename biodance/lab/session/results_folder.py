@@ -198,8 +198,6 @@ def file_hash(path: Path) -> str:
 
 
 _LOCK = ".biodance.lock"
-_EXCHANGE, _HERE = 2, -100
-"""RENAME_EXCHANGE and AT_FDCWD of renameat2(2): both names change places at once."""
 
 
 @dataclass(frozen=True)
@@ -259,7 +257,8 @@ def put_in_place(part: Path, place: Path, *, alone: bool = False) -> None:
 def _exchange(one: Path, other: Path) -> None:
     """Let two folders change places; where the file system cannot do it at once, in three steps."""
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if rename is not None and rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+    here, exchange = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of renameat2(2): both names change places at once
+    if rename is not None and rename(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0:
         return
     aside = one.with_name(f"{one.name}.earlier")
     other.replace(aside)

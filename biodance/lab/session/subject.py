@@ -1,7 +1,7 @@
 """Who is in the session: declared (session.toml, Vicon files, recordings), else guessed; every guess is said."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
@@ -110,11 +110,13 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
 
 
 NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
-_MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
-_STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
-_LEGAL_MASS, _LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
-
-
+_DECLARED = {
+    "mass": (("bodymass", "mass_kg", "mass", "weight"), (5.0, 400.0)),
+    "stature": (("height", "stature", "height_m", "bodyheight"), (0.4, 2.6)),
+    "sex": (("gender", "sex"), (0.0, 1.0)),
+    "age": (("age",), (0.0, 120.0)),
+}
+"""What files declare of a person, in kg, m and years (sex: 0 woman, 1 man): its names, and the numbers that can be."""
 _Declared = tuple[float, str]
 """One declared number and where it stands."""
 
@@ -137,10 +139,10 @@ def identify_subject(
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
     sources = {**files, **{trial.source.path.name: trial.measurements for trial in ordered}}
     notes: list[str] = []
-    masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
-    mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
-    stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
-    told = next((value for value, _ in _declared(sources, ("gender", "sex"), (0.0, 1.0)) if value in (0.0, 1.0)), None)
+    mass = _choose("body mass", "kg", _declared(sources, "mass", typed.mass_kg), notes)
+    mass = _with_devices(mass, devices, notes)
+    stature = _choose("stature", "m", _declared(sources, "stature", typed.height_m), notes)
+    told = next((value for value, _ in _declared(sources, "sex") if value in (0.0, 1.0)), None)
     declared: Literal["F", "M"] | None = None if told is None else "M" if told else "F"  # files hold it as 0 or 1
     sex = typed.sex or declared
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
@@ -148,7 +150,7 @@ def identify_subject(
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     mass = _middle_mass(mass, stature, trials, notes)
-    age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, ("age",), (0.0, 120.0))], [])
+    age = _choose("age", "years", _declared(sources, "age", typed.age), [])
     if math.isnan(age):
         notes.append(
             "The age is not given: adult tables and limits are used (below 1.50 m with twice their standard "
@@ -162,29 +164,21 @@ def identify_subject(
     return Subject(mass, stature, sex, age, typed.name or name, measures, guessed, *shape, *worn), tuple(notes)
 
 
-def declared_mass(measurements: Mapping[str, float]) -> float:
-    """Return the body mass (kg) among the measurements of one file; NaN if it is not there or outside 5 to 400 kg."""
-    return next((value for value, _ in _declared({"": measurements}, _MASS_NAMES, _LEGAL_MASS)), math.nan)
+def declared(measurements: Mapping[str, float], what: str) -> float:
+    """Return "mass" (kg) or "stature" (m) among the measurements of one file; NaN if it is not there, or no person's:
+    outside 5 to 400 kg, or 0.4 to 2.6 m.
+    """
+    return next((value for value, _ in _declared({"": measurements}, what)), math.nan)
 
 
-def declared_stature(measurements: Mapping[str, float]) -> float:
-    """Return the stature (m) among the measurements of one file; NaN if it is not there or outside 0.4 to 2.6 m."""
-    return next((value for value, _ in _declared({"": measurements}, _STATURE_NAMES, _LEGAL_STATURE)), math.nan)
-
-
-def _typed(value: float | None) -> list[_Declared]:
-    return [] if value is None else [(value, "session.toml")]
-
-
-def _declared(
-    sources: Mapping[str, Mapping[str, float]], names: Iterable[str], legal: tuple[float, float]
-) -> list[_Declared]:
-    """Return what the sources declare under one of the names, in order, within the legal range."""
-    found = []
+def _declared(sources: Mapping[str, Mapping[str, float]], what: str, typed: float | None = None) -> list[_Declared]:
+    """Return what was ``typed`` in session.toml and what the sources declare (`_DECLARED`), in order, if legal."""
+    found = [] if typed is None else [(typed, "session.toml")]
+    names, (low, high) = _DECLARED[what]
     for source, values in sources.items():
         lower = {key.lower(): value for key, value in values.items()}
         value = next((lower[name] for name in names if name in lower), math.nan)
-        if legal[0] <= value <= legal[1]:
+        if low <= value <= high:
             found.append((value, source))
     return found
 
@@ -250,16 +244,17 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
     """Return the stature (m) by the markers of a static trial, else of the tallest moving one; NaN if none."""
+    _, (low, high) = _DECLARED["stature"]
     for trial in (t for t in trials if t.role == "static"):
         stature, sd, told_by = stature_of_markers(trial)
-        if _LEGAL_STATURE[0] <= stature <= _LEGAL_STATURE[1]:
+        if low <= stature <= high:
             notes.append(
                 f"The stature was not declared: {stature:.2f} m (standard deviation {sd:.2f} m) were guessed from the "
                 f"heights over the ankles of {told_by} in {trial.name}."
             )
             return stature
     moving = [(*stature_of_movement(t), t.name) for t in trials if t.role != "static"]
-    known = [one for one in moving if _LEGAL_STATURE[0] <= one[0] <= _LEGAL_STATURE[1]]
+    known = [one for one in moving if low <= one[0] <= high]
     if not known:
         notes.append(
             "The stature is not known: it is not declared and neither a static trial nor anybody upright tells it. Set "
