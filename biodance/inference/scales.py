@@ -181,12 +181,12 @@ def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: 
     def put(inner: Array, part: slice) -> Array:
         out = np.empty((K + tail.shape[1], K + tail.shape[1]))
         cross = X[part].T @ heavy[part]
-        # X' W X is known by blocks; only the products with the tail are new for this hypothesis.
+        # X' W X is known; only the products with the tail are new for this hypothesis.
         out[:K, :K], out[:K, K:], out[K:, :K] = inner, cross, cross.T
         out[K:, K:] = tail[part].T @ heavy[part]
         return out
 
-    plates = put(columns.plates if (sure == 1).all() else columns.scaled(square), slice(n))
+    plates = put(columns.scaled(square), slice(n))
     markers = put(columns.markers, slice(n, r))
     observed = np.concatenate([X[r:], tail[r:]], axis=1)
     used = np.flatnonzero(observed.any(axis=0))
