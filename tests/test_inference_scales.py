@@ -44,6 +44,11 @@ def sure(drawn):
     return np.ones(drawn.noises + 1)
 
 
+def starts(cell):
+    """Return where columns of another cell begin."""
+    return np.flatnonzero(np.diff(cell, prepend=-1))
+
+
 def density(drawn, scales, *more):
     """Return the log density of the target, with the priors of the scales."""
     zero = np.zeros(len(drawn.y))
@@ -124,7 +129,7 @@ def test_scales_move_along_the_slope_of_the_evidence_by_fisher_s_information() -
     """A step is slope over information; the slope by finite differences of the dense density."""
     drawn, at = rows(np.random.default_rng(5), observations=0), SCALES[1]
     found, sd, step = posterior(inner(drawn), prior_sd(drawn), at), prior_sd(drawn), 1e-4
-    known = found.curvature(found.products.group, 3)
+    known = found.curvature(starts(found.products.group))
     moved = nearer(found, sd)
     ways = [[replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)] for g in range(3)]
     slope = np.array([(density(drawn, up) - density(drawn, down)) / (2 * step) for up, down in ways])
@@ -142,7 +147,8 @@ def test_what_is_observed_of_a_scale_is_the_second_derivative_of_the_evidence() 
     for g in range(3):
         here = [density(drawn, replace(at, groups=at.groups + way * step * np.eye(3)[g])) for way in (-1, 0, 1)]
         bent = -np.diff(here, 2)[0] / step**2
-        assert found.curvature(found.products.group, 3).observed[g] + 1 / sd[g] ** 2 == pytest.approx(bent, rel=1e-5)
+        told = found.curvature(starts(found.products.group)).observed[g]
+        assert told + 1 / sd[g] ** 2 == pytest.approx(bent, rel=1e-5)
 
 
 @pytest.mark.parametrize("size", [4.0, 8.0, 30.0])
@@ -163,8 +169,8 @@ def test_the_information_on_scales_is_that_of_many_draws(plates: int, markers: i
     for _ in range(1500):
         target = root @ rng.normal(size=len(drawn.y))
         one = posterior(products(columns, none, target, sure(drawn)), prior_sd(drawn), at)
-        slopes.append(np.bincount(group, weights=one.u**2) + one.curvature(group, 3).shares - np.bincount(group))
-    known = posterior(inner(drawn), prior_sd(drawn), at).curvature(group, 3).known
+        slopes.append(np.bincount(group, weights=one.u**2) + one.curvature(starts(group)).shares - np.bincount(group))
+    known = posterior(inner(drawn), prior_sd(drawn), at).curvature(starts(group)).known
     own = np.diag(known)
     np.testing.assert_allclose(np.mean(slopes, axis=0), 0.0, atol=0.35)
     # Standard deviation of a covariance of 1500 draws: the root of the product of both variances over that of 1500.
@@ -188,7 +194,7 @@ def test_a_member_s_scale_moves_with_its_group_s_along_both_slopes() -> None:
 
     logs = np.concatenate([at.groups, at.members])
     slope = np.array([moved(logs + step * one) - moved(logs - step * one) for one in np.eye(5)]) / (2 * step)
-    known = found.curvature(np.where(drawn.group < 2, drawn.group, 2 + drawn.member), 4)
+    known = found.curvature(starts(np.where(drawn.group < 2, drawn.group, 2 + drawn.member)))
     information = known.known + np.diag(np.maximum(known.observed - np.diag(known.known), 0.0))
     prior = np.diag(np.concatenate([1 / sd**2, np.full(2, 1 / EACH**2)]))
     expected = logs + np.clip(np.linalg.solve(parts.T @ information @ parts + prior, slope), -0.7, 0.7)

@@ -3,6 +3,7 @@
 import ctypes
 import errno
 import fcntl
+import gc
 import hashlib
 import json
 import math
@@ -153,6 +154,7 @@ def load_all() -> None:
         family()
     body = human(Subject(70.0, 1.75, "F"))
     poses(body, body.neutral)
+    gc.freeze()  # what is loaded stays: no collection need look through it
 
 
 PART = ".part-"

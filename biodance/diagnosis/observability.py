@@ -69,11 +69,18 @@ class Visibility:
         """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a
         (first parameter, its own unit) is expected to be fixed + growth a².
         """
-        way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
-        pull = (self.G[:, cut] @ way)[self._places]
-        # 1/2 shift'(1 + G)^-1 shift, the shift that a unit of this cause gives to every score.
-        growth = 0.5 * np.sum((pull[:, None] @ self._padded)[:, 0] * pull, axis=1)
+        growth = self._growth[:, index]
         return self._fixed[index] - self._fixed, growth[index] - growth
+
+    @cached_property
+    def _growth(self) -> Array:
+        """(C, C) what a unit of each cause (column) adds to the expected log Bayes factor of every one (row)."""
+        ways = np.zeros((len(self.G), len(self.causes)))
+        for index, (one, cut) in enumerate(zip(self.causes, self.cuts, strict=True)):
+            ways[cut, index] = unit_directions(one)[0]
+        pull = (self.G @ ways)[self._places]
+        # 1/2 shift'(1 + G)^-1 shift, the shift that a unit of one cause gives to every score.
+        return np.asarray(0.5 * np.sum((self._padded @ pull) * pull, axis=1))
 
     @cached_property
     def _prior(self) -> dict[tuple[str, str], float]:

@@ -454,8 +454,8 @@ def _smallest(bodies: tuple[_Judged, ...], i: int) -> float:
         # Imagined data y = true b: - y'y / 2 in units in which "no load" has unit variance.
         none = nothing - 0.5 * true**2 * squares
         load = none[:, None] + log_ratio_if(true, _COARSE, squares, own, wide)
-        left = logsumexp(none)
-        return bool(left - np.logaddexp(left, logsumexp(load + prior)) < np.log(_THRESHOLD))
+        left = np.logaddexp.reduce(none)
+        return bool(left - np.logaddexp(left, np.logaddexp.reduce((load + prior).ravel())) < np.log(_THRESHOLD))
 
     # Announced from some mass on: bisection over an increasing list of booleans.
     at = bisect_left(range(len(_TRUE)), True, key=lambda step: announced(float(_TRUE[step])))

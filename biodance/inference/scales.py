@@ -140,21 +140,26 @@ class ScaledFit:
         """(K,) posterior mean per unit of the unscaled columns."""
         return np.asarray(self.size * self.u)
 
-    def curvature(self, cell: NDArray[np.intp], count: int) -> Curvature:
-        """Return what the data tell of the scales of ``count`` cells, of which each column belongs to ``cell`` (K,),
-        -1: to none.
-        """
-        half = dpotri(self.lower, lower=True)[0] if cell.size else self.lower  # C below its diagonal, zero above
-        own = np.diag(half)
-        C = half + np.tril(half, -1).T
-        there = (cell[:, None] == np.arange(count)).astype(float)
-        shares = own @ there
+    def curvature(self, starts: NDArray[np.intp]) -> Curvature:
+        """Return what the data tell of the scales of cells, whose columns lie side by side from ``starts`` (C,) on."""
+        if not starts.size:
+            return Curvature(np.empty(0), np.empty((0, 0)), np.empty(0), 0.0)
+        # C above its diagonal, zero below: a sum over the whole is twice that over this half, less its diagonal.
+        half = dpotri(self.lower, lower=True)[0].T
+
+        def summed(upper: Array) -> Array:
+            cells = np.add.reduceat(np.add.reduceat(upper, starts, axis=0), starts, axis=1)
+            return np.asarray(cells + cells.T - np.diag(np.add.reduceat(np.diag(upper), starts)))
+
+        shares, own = np.add.reduceat(np.diag(half), starts), np.add.reduceat(self.u**2, starts)
+        count = np.diff(starts, append=len(self.u))
         # |C_cd|^2 (Frobenius) between all cells; |1 - C|^2 differs on the diagonal alone.
-        square = there.T @ (C**2 @ there)
-        known = 2 * square + np.diag(2 * (there.sum(axis=0) - 2 * shares))
-        within = np.sum(there * (C @ (self.u[:, None] * there)) * self.u[:, None], axis=0)  # u_c' C_cc u_c
-        observed = 2 * (self.u**2 @ there - 2 * within + shares - np.diag(square))
-        taken = self.size @ (C * self.products.plates[:-1, :-1]) @ self.size  # tr(L C L X'X)
+        square = summed(half**2)
+        known = 2 * square + np.diag(2 * (count - 2 * shares))
+        within = np.diag(summed(self.u[:, None] * half * self.u))  # u_c' C_cc u_c
+        observed = 2 * (own - 2 * within + shares - np.diag(square))
+        half *= self.products.plates[:-1, :-1]
+        taken = self.size @ (2 * (half @ self.size) - np.diag(half) * self.size)  # tr(L C L X'X)
         return Curvature(shares, known, observed, float(taken * np.exp(-2 * self.scales.noise)))
 
 
@@ -176,13 +181,13 @@ def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array, without: 
     def put(inner: Array, part: slice) -> Array:
         out = np.empty((K + tail.shape[1], K + tail.shape[1]))
         cross = X[part].T @ heavy[part]
-        # X' W X is known by blocks; only the products with the tail are new for this hypothesis.
+        # X' W X is known; only the products with the tail are new for this hypothesis.
         out[:K, :K], out[:K, K:], out[K:, :K] = inner, cross, cross.T
         out[K:, K:] = tail[part].T @ heavy[part]
         return out
 
-    plates = put(columns.plates if (sure == 1).all() else columns.scaled(square), slice(n))
-    markers = put(columns.inner[-1], slice(n, r))
+    plates = put(columns.scaled(square), slice(n))
+    markers = put(columns.markers, slice(n, r))
     observed = np.concatenate([X[r:], tail[r:]], axis=1)
     used = np.flatnonzero(observed.any(axis=0))
     group, member = (np.append(one, np.full(Z.shape[1], -1)) for one in (columns.group, columns.member))
@@ -236,7 +241,7 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     # A = 1 + L X' S^-2 X L: rows, then columns times their sizes.
     A = size[:, None] * whole[:K, :K]
     A *= size
-    A[np.diag_indices(K)] += 1.0
+    A.flat[:: K + 1] += 1.0
     # A is symmetric: its transpose is the same matrix in LAPACK's order, so that nothing is copied.
     lower = cholesky(A.T, lower=True, overwrite_a=True, check_finite=False)
     u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
@@ -257,10 +262,9 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
     than ``least``.
     """
     at, found = one.scales, one.products
-    cell, parts = _cells(found, at)
-    known = one.curvature(cell, len(parts))
-    free = cell >= 0
-    slope = np.bincount(cell[free], one.u[free] ** 2 - 1.0, len(parts)) + known.shares
+    starts, parts = _cells(found, at)
+    known = one.curvature(starts)
+    slope = np.add.reduceat(one.u**2 - 1.0, starts) + known.shares
     logs, precision = np.append(at.groups, at.members), np.append(1 / sd**2, np.full(at.members.size, 1 / EACH**2))
     # The larger information, with the prior's: what is expected, raised to what is observed of each cell.
     information = known.known + np.diag(np.maximum(known.observed - np.diag(known.known), 0.0))
@@ -276,11 +280,10 @@ def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
 
 
 def _cells(found: Products, at: Scales) -> tuple[NDArray[np.intp], Array]:
-    """Return the cell (K,) of each column, -1 if its scale is fixed, and (C, G + M) 1 for the logarithms it sums."""
-    free = (found.group >= 0) | (found.member >= 0)
-    pairs, of_free = np.unique([found.group[free], found.member[free]], axis=1, return_inverse=True)
-    cell = np.full(found.group.size, -1)
-    cell[free] = of_free.ravel()
+    """Return where each cell (C,) begins, and (C, G + M) 1 for the logarithms that its scale sums; of a fixed one 0."""
+    changed = np.diff([found.group, found.member], axis=1, prepend=-2).any(axis=0)
+    starts = np.flatnonzero(changed)
     # Index -1, of neither, is none of those counted here.
-    parts = [pairs[k][:, None] == np.arange(some.size) for k, some in enumerate((at.groups, at.members))]
-    return cell, np.concatenate(parts, axis=1).astype(float)
+    pairs = (found.group[starts], at.groups), (found.member[starts], at.members)
+    parts = [index[:, None] == np.arange(some.size) for index, some in pairs]
+    return starts, np.concatenate(parts, axis=1).astype(float)

@@ -78,16 +78,26 @@ class Search:
 
     @cached_property
     def crossed(self) -> Array:
-        """(Q, K, k) products of columns that are no fault with those of the causes, in each noise group."""
-        return self.columns.within(self.Z)
+        """(K, k) products of columns that are no fault with those of the causes in all rows of the plates."""
+        n = self.rows.plates
+        return np.asarray(self.columns.X[:n].T @ self.Z[:n])
 
     def crossed_at(self, weight: Array) -> Array:
-        """Return (K, k) X' W Z where the rows of a noise group have one weight."""
-        rows, r = self.rows, self.rows.simulated
-        # All rows of a group have the same weight: any of them fills its entry.
-        groups = np.zeros(rows.noises)
-        groups[rows.block[:r]] = weight[:r]
-        return np.tensordot(groups, self.crossed, 1) + self.columns.X[r:].T @ (weight[r:, None] * self.Z[r:])
+        """Return (K, k) X' W Z where most rows of the plates have one weight, the largest."""
+        n = self.rows.plates
+        usual = float(weight[:n].max(initial=0.0))
+        more = weight - np.where(np.arange(weight.size) < n, usual, 0.0)
+        others = np.flatnonzero(more)
+        # X' W Z = w X'Z in the plates + X' (W - w) Z: only rows of another weight are looked at again.
+        return np.asarray(usual * self.crossed + self.columns.X[others].T @ (more[others, None] * self.Z[others]))
+
+    @cached_property
+    def sized(self) -> tuple[tuple[tuple[int, float], ...], Array]:
+        """Causes and sizes, in typical ones, at which they are screened; the rows (r, m) that each adds there."""
+        tried = tuple((k, share) for k, one in enumerate(self.causes) for share in one.effect.screened_at)
+        pairs = ((self.causes[k].effect, share) for k, share in tried)
+        rows = [self.rows.added(effect, share * effect.typical) for effect, share in pairs]
+        return tried, np.stack(rows, axis=1) if rows else np.empty((len(self.rows.y), 0))
 
     def score(self, base: "Hypothesis", Z: Array) -> tuple[Array, Array]:
         """Return score (k,) and information (k, k) of further whitened columns ``Z`` (r, k) beside a hypothesis."""
@@ -286,37 +296,54 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
         cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
     # L^-1 (L_size X' W Z) of all causes at once; the Schur complement of each is cut out of it below.
     half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
+    values, means = _gained(search, half, weight, search.Z.T @ (weight * left))
     heard, sizes = _told_by_outliers(left[r:], search.Z[r:, [cut.start for cut in search.cuts]])
-    scored = []
-    for cause, cut, told, size in zip(search.causes, search.cuts, heard, sizes, strict=True):
+    at_sizes, scored = _at_sizes(search, one), []
+    for k, (cause, told, size) in enumerate(zip(search.causes, heard, sizes, strict=True)):
         if cause.names in one.names:
             continue
-        Z = search.Z[:, cut]
-        weighted = weight[:, None] * Z
-        G, s = Z.T @ weighted - half[:, cut].T @ half[:, cut], weighted.T @ left
-        inner = np.linalg.inv(np.eye(len(s)) + G)
-        mean = inner @ s
-        # `inner` is (1 + G)^-1: + 1/2 log|inner| is - 1/2 log|1 + G|.
-        value = 0.5 * float(s @ mean) + 0.5 * float(np.linalg.slogdet(inner)[1])
+        value, mean = values[k], means[k]
         if told > value:
-            value, mean = float(told), np.append(size, np.zeros(len(s) - 1))
-        tried = [(value, cause.start(mean)), *_at_sizes(search, one, cause.effect)]
+            value, mean = float(told), np.append(size, np.zeros(len(mean) - 1))
+        tried = [(value, cause.start(mean)), *at_sizes.get(k, ())]
         value, begin = max(tried, key=lambda pair: pair[0])
         scored.append(Scored(cause.effect, value + search.prior[cause.names], begin))
     return scored
 
 
-def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[float, Array]]:
-    """Return what a cause gains (Laplace) near each size at which it is screened, prior included, and the size."""
-    out = []
-    for share in effect.screened_at:
-        # One column, the whole of what the cause adds at that size: coefficient 1.
-        s, G = search.score(one, search.rows.added(effect, share * effect.typical)[:, None])
+def _gained(search: Search, half: Array, weight: Array, score: Array) -> tuple[dict[int, float], dict[int, Array]]:
+    """Return by cause what it gains beside a hypothesis and the mean of its coefficients: of rows of one ``weight``
+    (r,), the ``score`` (k,) of all columns, and ``half`` (K, k) of what the hypothesis holds of them.
+    """
+    width = np.array([cut.stop - cut.start for cut in search.cuts])
+    values: dict[int, float] = {}
+    means: dict[int, Array] = {}
+    for count in np.unique(width):  # causes with as many columns together
+        some = np.flatnonzero(width == count).tolist()
+        at = np.array([search.cuts[k].start for k in some])[:, None] + np.arange(count)
+        Z, held, s = search.Z[:, at], half[:, at], score[at]
+        G = np.einsum("rci,rcj->cij", weight[:, None, None] * Z, Z) - np.einsum("rci,rcj->cij", held, held)
+        inner = np.linalg.inv(np.eye(count) + G)
+        mean = np.einsum("cij,cj->ci", inner, s)
+        # `inner` is (1 + G)^-1: + 1/2 log|inner| is - 1/2 log|1 + G|.
+        value = 0.5 * np.sum(s * mean, axis=1) + 0.5 * np.linalg.slogdet(inner)[1]
+        values |= zip(some, value.tolist(), strict=True)
+        means |= zip(some, mean, strict=True)
+    return values, means
+
+
+def _at_sizes(search: Search, one: Hypothesis) -> dict[int, list[tuple[float, Array]]]:
+    """Return by cause what it gains (Laplace) near each size at which it is screened, prior included, and the size."""
+    tried, rows = search.sized
+    score, information = search.score(one, rows)
+    out: dict[int, list[tuple[float, Array]]] = {}
+    # One column each, the whole of what the cause adds at that size: coefficient 1.
+    for (cause, share), s, G in zip(tried, score, np.diag(information), strict=True):
         u = share / SCALE
         # log p(y | u) / p(y | 0) = s - G / 2; -u^2 / 2 of the slab; G / u^2: information per
         # slab's standard deviation.
-        value = s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)
-        out.append((float(value), share * effect.typical))
+        value = s - 0.5 * G - 0.5 * u**2 - 0.5 * np.log1p(G / u**2)
+        out.setdefault(cause, []).append((float(value), share * search.causes[cause].effect.typical))
     return out
 
 

@@ -53,7 +53,7 @@ class Sensitivity:
     def to(self, plate: str, change: Array) -> float:
         """Return the derivative with respect to the size of a ``change`` B (6, 7) of a plate."""
         # <gradient, change>: chain rule, summed over all elements.
-        return float(np.sum(self.plates[plate] * change)) if plate in self.plates else 0.0
+        return float(np.vdot(self.plates[plate], change)) if plate in self.plates else 0.0
 
 
 def by_plate(gradient: Array, plates: Mapping[str, Array]) -> dict[str, Array]:

@@ -1,5 +1,6 @@
 """Files that stand whole or not at all; tables as CSV, for spreadsheets, and as Parquet, which keeps types."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.plain_text import for_spreadsheet, write_whole
 from biodance.lab.session.results_folder import made_folder
-from biodance.report.tables.schema import Row, plain_values, to_text
+from biodance.report.tables.schema import Row, to_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -43,8 +44,9 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
 
 def write_results(folder: Path, document: Row, files: Mapping[str, str]) -> Row:
     """Write a ``document`` as results.json and ``files`` beside it; return it as programs read it."""
-    told: Row = plain_values(document)
-    write_files(folder, {"results.json": to_text(told), **files})
+    text = to_text(document)
+    write_files(folder, {"results.json": text, **files})
+    told: Row = json.loads(text)
     return told
 
 

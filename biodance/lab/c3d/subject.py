@@ -78,6 +78,7 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
     if not rate >= 500.0 or len(analog) < rate / 2:
         return ()
     time = np.arange(len(analog)) / rate
+    high, low = butter(2, 20.0, "high", fs=rate, output="sos"), butter(2, 6.0, fs=rate, output="sos")
     for column, label in enumerate(labels):
         named = muscle_of(label)
         if named is None or named in found or column >= analog.shape[1]:
@@ -91,8 +92,8 @@ def emg_envelopes(analog: Array, rate: float, labels: Sequence[str], units: Sequ
         # What goes below zero is not rectified yet: raw EMG goes as far below zero as above, and beside an offset of
         # the amplifier nothing comes near zero.
         if abs(value.min()) > 0.02 * np.abs(value).max():
-            value = np.abs(sosfiltfilt(butter(2, 20.0, "high", fs=rate, output="sos"), value - value.mean()))
-        envelope = np.asarray(np.maximum(sosfiltfilt(butter(2, 6.0, fs=rate, output="sos"), value), 0.0))
+            value = np.abs(sosfiltfilt(high, value - value.mean()))
+        envelope = np.asarray(np.maximum(sosfiltfilt(low, value), 0.0))
         found[named] = EmgEnvelope(*named, told, time, factor * envelope)
     strongest = max((one.value.max() for one in found.values()), default=0.0)
     return tuple(one for one in found.values() if one.value.max() > _SILENT * strongest)

@@ -406,13 +406,13 @@ def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
     J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))
     # Coordinates that are free only: held joints follow nothing.
     J = J[:, :, np.concatenate([np.ones(body.n_root, dtype=bool), body.free])]
-    weighted = np.swapaxes(J, 1, 2) * np.repeat(body.markers.weight[rows], 3)
+    weighted = J * np.repeat(body.markers.weight[rows], 3)[:, None]
     # J'WJ with a ridge, as markers may leave a coordinate open.
-    normal = weighted @ J
+    normal = np.swapaxes(weighted, 1, 2) @ J
     # A millionth of the mean squared lever keeps what no marker shows where it is.
     normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / J.shape[2] * np.eye(J.shape[2])
     # Diagonal of J (J'WJ)^-1 J'W: how far each coordinate of a marker follows itself.
-    share = np.sum(np.swapaxes(J, 1, 2) * np.linalg.solve(normal, weighted), axis=1)
+    share = np.sum(J @ np.linalg.inv(normal) * weighted, axis=2)
     return np.asarray(share.reshape(len(q), -1, 3).mean(axis=2))
 
 

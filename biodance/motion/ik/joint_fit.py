@@ -46,10 +46,10 @@ def with_slides(body: Body, products: Array, angles: Array, kept: Index) -> tupl
     blocks = [(np.flatnonzero(np.repeat(on, 3) == one), angles[:, beside[:, one]]) for one in np.unique(on)]
     # Moments with the angles: sum over t of angle[t, n] X'X[t, own, :].
     shared = [np.tensordot(turn, products[:, own], axes=(0, 0)) for own, turn in blocks]
-    square = []
-    for own, turn in blocks:
-        row = []
-        for others, other in blocks:
+    square: list[list[Array]] = []
+    for k, (own, turn) in enumerate(blocks):
+        row = [above[k].T for above in square]  # S'S is symmetric
+        for others, other in blocks[k:]:
             pairs = (turn[:, :, None] * other[:, None]).reshape(len(angles), -1)
             block = np.tensordot(pairs, products[:, own][:, :, others], axes=(0, 0))
             block = block.reshape(turn.shape[1], other.shape[1], own.size, others.size)
