@@ -163,7 +163,7 @@ function trialRow(row, view, edit) {
     h(
       "td",
       { cls: "n", "data-label": "Time" },
-      row.name ? `${number(row.seconds, 2)} s at ${number(row.rate_hz, 0)} Hz` : "–",
+      !row.name ? "–" : row.seconds > 0 ? `${number(row.seconds, 2)} s at ${number(row.rate_hz, 0)} Hz` : "1 frame",
     ),
     h("td", { "data-label": "Markers" }, row.name ? String(row.markers) : "–"),
     h("td", { "data-label": "Plates" }, row.name ? row.plates.join(", ") || "none" : "–"),
