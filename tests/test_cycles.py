@@ -278,6 +278,20 @@ def test_the_pelvis_has_the_signs_that_the_docstring_says(side):
     assert found["centre_of_mass_height"] > 0.5
 
 
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_foot_that_is_turned_about_its_length_with_the_heel_up_has_no_progression(side):
+    time = np.arange(0, 2, 1 / RATE)
+    angles = {
+        f"{side}_ankle_{name}": np.full(time.size, angle)
+        for name, angle in (("dorsiflexion", -1.1), ("inversion", 0.3))
+    }
+    moved = motion_of(time, angles, np.stack([1.2 * time, 0 * time, 0.9 + 0 * time], axis=1))
+    cycle = Cycle("walk", "gait", side, 0.2, 1.6, np.nan)
+    curves = lab_curves(cycle, BODY, moved, soles_from_body(BODY, moved), centre_of_mass(BODY, moved))
+    (told,) = [one.value for one in curves if one.quantity == "foot_progression"]
+    assert np.abs(told).max() < 3.0
+
+
 def test_repeats_have_mean_and_sd_and_gaps_stay_gaps():
     time = np.arange(0, 4, 1 / RATE)
     angle = np.where(time < 2, 0.2, 0.4)
