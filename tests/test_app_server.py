@@ -324,6 +324,8 @@ def test_a_part_of_the_page_stands_alone_and_can_do_nothing_to_the_window(user, 
     assert answer.headers["content-security-policy"].startswith("sandbox ")
     assert "nothing to show" in user.get("/page", params={"name": NAME, "part": "body"}).text
     assert user.get("/page", params={"name": NAME}).text == text.format("movement")
+    (folder / "report.html").write_text(text.format("checks"), encoding="utf-8")
+    assert "No whole gait cycle" in user.get("/page", params={"name": NAME, "part": "gait"}).text
 
 
 def test_a_browser_builds_the_picture_in_space_only_where_it_is_shown(user, archive):

@@ -372,6 +372,21 @@ def test_two_quick_changes_are_both_written(browser, archive):
     assert browser.run("document.querySelector('#said').hidden")
 
 
+def test_all_guesses_that_are_orange_are_accepted_at_once(browser, archive):
+    file = archive / "S03" / "session.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text("", encoding="utf-8")
+    go(browser, "#/", "document.querySelectorAll('tbody tr').length === 3")
+    go(browser, "#/S03/trials", "document.querySelector('[data-key=accept]')")
+    orange = "document.querySelectorAll('#panel .guess').length"
+    browser.until(f"{orange} > 0", 60)
+    count = browser.run(orange)
+    assert browser.run("document.querySelector('[data-key=accept]').textContent").startswith(f"Accept the {count} ")
+    browser.run("document.querySelector('[data-key=accept]').click()")
+    browser.until(f"{orange} === 0", 60)
+    file.write_text(before, encoding="utf-8")
+
+
 def test_nothing_is_asked_of_the_network_and_nothing_fails(browser, address):
     assert {one.split("/")[2] for one in browser.asked() if "://" in one} == {address.split("/")[2]}
     said = [one for one in browser.said() if "WebGL" not in one and "GL Driver" not in one]

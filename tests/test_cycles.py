@@ -1,5 +1,6 @@
 """Cycles and curves on movements whose events, lengths and angles are set by hand."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -177,6 +178,17 @@ def test_double_support_is_not_told_where_a_foot_s_own_lift_is_unknown():
         assert one.values.get("double_support") == (pytest.approx(20.0) if known else None)
 
 
+def test_who_walks_slowly_has_cycles_and_who_stands_between_two_steps_has_none():
+    def found(*times):
+        sides = itertools.cycle(("left", "right"))
+        return [one.duration for one in gait_cycles("t", tuple(FootEvent(t, next(sides), True) for t in times))]
+
+    assert found(0.0, 1.3, 2.6, 3.9) == pytest.approx([2.6, 2.6])  # 0.2 m/s
+    assert found(0.0, 2.1, 4.2) == []
+    # Steps of 0.6 s; before the last two somebody stands for a second and a half: each foot has one such cycle.
+    assert found(0.0, 0.6, 1.2, 1.8, 2.4, 4.5, 5.1) == pytest.approx([1.2, 1.2, 1.2])
+
+
 def test_on_a_treadmill_the_belt_s_way_is_walked():
     moved, _ = walk(belt=SPEED)
     events = kinematic_events(BODY, moved)
@@ -258,11 +270,26 @@ def test_the_pelvis_has_the_signs_that_the_docstring_says(side):
     q[:, 3:7] = (turn * Rotation.from_quat(BODY.neutral[3:7])).as_quat()
     moved = replace(still, q=q)
     cycle = Cycle("walk", "gait", side, 0.2, 1.6, np.nan)
-    found = {one.quantity: one.value.mean() for one in lab_curves(cycle, BODY, moved, soles_from_body(BODY, moved))}
+    curves = lab_curves(cycle, BODY, moved, soles_from_body(BODY, moved), centre_of_mass(BODY, moved))
+    found = {one.quantity: one.value.mean() for one in curves}
     assert found["pelvis_tilt"] == pytest.approx(4, abs=1e-6)  # about the left axis: forwards
     assert found["pelvis_obliquity"] == pytest.approx(6, abs=1e-6)
     assert found["pelvis_rotation"] == pytest.approx(10, abs=1e-6)
     assert found["centre_of_mass_height"] > 0.5
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_foot_that_is_turned_about_its_length_with_the_heel_up_has_no_progression(side):
+    time = np.arange(0, 2, 1 / RATE)
+    angles = {
+        f"{side}_ankle_{name}": np.full(time.size, angle)
+        for name, angle in (("dorsiflexion", -1.1), ("inversion", 0.3))
+    }
+    moved = motion_of(time, angles, np.stack([1.2 * time, 0 * time, 0.9 + 0 * time], axis=1))
+    cycle = Cycle("walk", "gait", side, 0.2, 1.6, np.nan)
+    curves = lab_curves(cycle, BODY, moved, soles_from_body(BODY, moved), centre_of_mass(BODY, moved))
+    (told,) = [one.value for one in curves if one.quantity == "foot_progression"]
+    assert np.abs(told).max() < 3.0
 
 
 def test_repeats_have_mean_and_sd_and_gaps_stay_gaps():

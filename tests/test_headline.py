@@ -14,7 +14,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DOUBTS, STRANGE, DiagnosisStatus, Reason
 from biodance.effects import QualityCheck, causes
 from biodance.pipeline.attention import headline
-from biodance.records.attention import Attention, Judged
+from biodance.records.attention import OTHER_PEOPLE, Attention, Judged
 
 FORBIDDEN = re.compile(
     r"not told from|outside the limit|fully measured|named, (?:in)?complete|unexplained|\{|\}|_|->|\bnan\b|\binf\b"
@@ -136,6 +136,19 @@ def test_exchanged_labels_are_told_in_one_breath() -> None:
     assert (
         said.text == "LFIN and RFIN, LWRA and RWRA carry each other's names. Exchange them, or accept the correction."
     )
+
+
+def test_files_of_other_people_are_told_before_what_is_said_of_the_rest() -> None:
+    strange = Attention("fail", "declares another person.", "b.c3d", OTHER_PEOPLE)
+    for one in found():
+        said = headline(one, (STATIC, WALKED), frozenset({"static"}), (strange, replace(strange, trial="c.c3d")))
+        assert len(said.text.split()) <= 30, said.text
+        assert said.level == "fail"
+    clean = headline(Diagnosis(True, ()), (STATIC, WALKED), frozenset({"static"}), (strange,)).text
+    assert clean.startswith("1 file is of another person, see below. Nothing wrong was found, but")
+    shift = named("time_delay", 0.0212, ())
+    told = headline(Diagnosis(True, (shift,)), (STATIC,), frozenset({"static"}), (strange, replace(strange, trial="c")))
+    assert told.text.startswith("2 files are of other people, see below. The forces of plate 2 are 21 ms late")
 
 
 def test_a_clean_session_says_what_it_rests_on() -> None:

@@ -9,6 +9,7 @@ from lab_sessions import person, roles, said, write_trial
 from biodance.errors import SessionRefused
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.session.read import read_session
+from biodance.records.attention import AnotherPerson
 
 TYPED = "[subject]\nmass_kg = 61\nheight_m = 1.7\n"
 
@@ -49,6 +50,7 @@ def test_a_recording_of_somebody_else_is_refused(tmp_path: Path, mass: float, st
     assert list(session.refused) == ["walk2.c3d"] * stranger
     assert ("walk2" in roles(session)) is not stranger
     assert all("in the static trial static" in why for why in session.refused.values())
+    assert all(isinstance(why, AnotherPerson) for why in session.refused.values())
 
 
 def test_what_session_toml_says_is_believed_of_every_recording(tmp_path: Path) -> None:

@@ -48,6 +48,11 @@ def test_the_section_shows_all_cycles_of_all_trials_and_how_to_get_a_reference()
     assert panel.count('stroke-dasharray="5 3" d="M2400 0v4000"') == 1  # the left foot leaves at 60 %
 
 
+def test_one_cycle_is_one_cycle() -> None:
+    moved = SessionMovement("visit", (trial("walk", [*level_gait(cycle(0, trial="walk"))]),), "table", 60.0, {})
+    assert "1 right gait cycle of 1 trial." in movement_section(moved)
+
+
 def test_the_trials_of_a_session_are_beside_each_other() -> None:
     text = movement_section(walked())
     assert "1: first" in text

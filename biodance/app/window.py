@@ -90,7 +90,7 @@ def page_part(place: SessionPlace, part: str) -> str:
         return page
     kept = [one for one in _PARTS.get(part, ()) if f'<section id="{one}">' in page]
     if not kept:
-        return _NOTHING
+        return _NOTHING.format(_WHY_NOT.get(part, "The last run has nothing to show here."))
     if "replay" not in kept:  # a browser would build the 3-D picture, which nobody sees there
         for script in (three_js(), template_text("replay.js")):
             page = page.replace(f"<script>{script}</script>", "")
@@ -100,7 +100,12 @@ def page_part(place: SessionPlace, part: str) -> str:
 
 
 _NOTHING = """<!doctype html><html lang="en"><title>biodance</title>
-<p style="font: 15px sans-serif">The last run has nothing to show here.</p></html>"""
+<p style="font: 15px sans-serif">{}</p></html>"""
+_WHY_NOT = {
+    "gait": "No whole gait cycle (from a foot's strike to its next), squat, rise or jump was found in any recording. "
+    "Steps shows the strikes that were found, Quality what could not be used."
+}
+"""Why a part of the page is empty, where there is one reason."""
 
 
 def results_file(place: SessionPlace, name: str) -> Path:

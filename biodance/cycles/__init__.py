@@ -27,6 +27,7 @@ from biodance.cycles.curves import (
     load_curves,
     over_cycle,
 )
+from biodance.cycles.pelvis import with_own_pelvis
 from biodance.cycles.strides import Stride, lift, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
@@ -365,9 +366,10 @@ def trial_movement(
     whole = np.asarray(known_of_feet.all(axis=1))
     sure = whole & ~shared
     on_one = [one for one in cycles if shared[(motion.time >= one.start) & (motion.time <= one.end)].any()]
+    shown = with_own_pelvis(trial, body, motion)
     curves, theirs, usual = list[CycleCurve](), list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
-        own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        own = [*angle_curves(cycle, body, shown), *lab_curves(cycle, body, shown, soles, centre)]
         curves += own
         theirs += file_curves(cycle, outputs, motion.time, own)
         usual += conventional_curves(cycle, conventional, body, motion, own)
@@ -384,7 +386,7 @@ def trial_movement(
         tuple(curves),
         strides(cycles, events, body, soles, centre),
         cut.agreement_of_events(force, markers),
-        compare_angles(body, motion, outputs, conventional),
+        compare_angles(body, shown, outputs, conventional),
         compare_events(events, outputs),
         tuple(theirs),
         tuple(usual),

@@ -11,12 +11,12 @@ from biodance.body.body import Body
 from biodance.cycles.cut import PERCENT, Cycle, heel_and_toe
 from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
-from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
+from biodance.motion.kinematics import Poses, chains, poses
 from biodance.motion.soles import Soles
 from biodance.records import SIDES, Array, Mask, Motion, Sip, Wrench, freeze, grouped
 from biodance.records.motion import BY_FRAME
 from biodance.settings import STANDARD_GRAVITY
-from biodance.spatial import zero_moment_point
+from biodance.spatial import zero_moment_point, zxy_angles
 
 _TRAVELS = 0.3
 """m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
@@ -125,16 +125,18 @@ def _seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
     return (side, name, 1.0) if side == cycle.side else None
 
 
-def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterator[CycleCurve]:
-    """Yield pelvis, foot progression (deg) and centre of mass (m) of a cycle.
+def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles, centre: Array) -> Iterator[CycleCurve]:
+    """Yield pelvis, foot progression (deg) and centre of mass, from ``centre`` (T, 3) m of the trial, of a cycle.
 
     The pelvis in the frame of the way it goes (of the way it faces on average where it goes nowhere), in the order
     rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0966-6362(00)00083-7): forward tilt, the cycle's own side up,
-    its own side forward are positive. Foot progression is the rotation of the foot in the same order, toes inwards
-    positive: what is left of it when the heel rises is no matter of the toes' line, which then points down. The centre
-    of mass: m ahead of where the cycle began, to the side of the foot, over the ground.
+    its own side forward are positive. Foot progression is the rotation of the foot about what is up in it, the last of
+    tilt, obliquity and rotation as in plug-in gait, toes inwards positive: told first, it would count what a foot with
+    a raised heel is turned about its own length. The centre of mass: m ahead of where the cycle began, to the side of
+    the foot, over the ground.
     """
-    motion = _only(motion, cycle.frames(motion.time))
+    part = cycle.frames(motion.time)
+    motion, centre = _only(motion, part), centre[part]
     pose, time = poses(body, motion.q), motion.time
     x, y = direction_of(cycle, pose, time)
     # Rows: ahead, up, right of the way, the axes of the pelvis and foot when they are not turned.
@@ -155,11 +157,9 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
         yield over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
     for side in SIDES:
         if cycle.side in (side, "both"):
-            # z axis of the foot; its first angle is that of Ry again.
-            across = frame @ pose.rotation[:, body.sip.segments.index(f"{side}_foot"), :, 2, None]
-            inwards = np.degrees(np.arctan2(across[:, 0, 0], across[:, 2, 0])) * (-1.0 if side == "left" else 1.0)
+            foot = frame @ pose.rotation[:, body.sip.segments.index(f"{side}_foot")]
+            inwards = np.degrees(zxy_angles(foot)[2]) * (-1.0 if side == "left" else 1.0)
             yield over_cycle(cycle, "foot_progression", side, "deg", time, known * inwards)
-    centre = centre_of_mass(body, motion)
     # Zero is the place at the start, and the ground in height.
     began = place_at(centre, time, cycle.start) * np.array([1.0, 1.0, 0.0])
     # Fifth percentile: single frames below the ground do not count.

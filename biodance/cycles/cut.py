@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import median_low
 from typing import Literal
 
 import numpy as np
@@ -196,7 +197,11 @@ def _turning_points(path: Array, motion: Motion, prominence: float, height: Arra
 _CycleKind = Literal["gait", "squat", "sit_to_stand", "jump"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
-_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5  # s of a gait cycle
+_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 4.0
+"""s of a gait cycle. After a stroke people walk as slowly as 0.23 m/s (Wu et al. 2019, doi:10.1038/s41598-019-54271-2):
+with steps of 0.3 m that is 2.6 s."""
+_STOOD = 2.0
+"""Times the middle cycle of its trial from which somebody has stood between two steps."""
 _DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at least
 _UP = 0.1  # Of a repetition's depth within which the pelvis counts as up, or a countermovement has not begun
 _SEATED = 0.03
@@ -258,7 +263,9 @@ def is_left_out(cycle: Cycle, spans: Iterable[LeftOutSpan]) -> bool:
 
 
 def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
-    """Return the cycles from each strike to the next of the same foot, with the other foot's strike between them."""
+    """Return the cycles from each strike to the next of the same foot, with the other foot's strike between them, but
+    those in which somebody stood (`_STOOD`).
+    """
     cycles = []
     for side in SIDES:
         strikes = [e.time for e in events if e.down and e.side == side]
@@ -269,7 +276,13 @@ def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
             offs = [e for e in events if not e.down and e.side == side and start < e.time < end]
             seen = [e for e in offs if e.source == "force"] or offs  # what a plate saw is no guess
             cycles.append(Cycle(trial, "gait", side, start, end, seen[0].time if len(seen) == 1 else float("nan")))
-    return tuple(sorted(cycles, key=lambda cycle: cycle.start))
+    return _walked(sorted(cycles, key=lambda cycle: cycle.start))
+
+
+def _walked(cycles: Sequence[Cycle]) -> tuple[Cycle, ...]:
+    """Return the cycles in which nobody stood."""
+    longest = _STOOD * median_low(one.duration for one in cycles) if cycles else 0.0
+    return tuple(one for one in cycles if one.duration < longest)
 
 
 def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[Cycle, ...]:

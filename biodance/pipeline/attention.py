@@ -28,6 +28,8 @@ from biodance.pipeline.words import (
 from biodance.records.attention import (
     LEVELS,
     LIMIT_TOLD,
+    OTHER_PEOPLE,
+    AnotherPerson,
     Attention,
     Doubt,
     Judged,
@@ -77,8 +79,12 @@ def headline(
         own = "warn" if missed else "note"
         well = all(other.level == "note" for other in others)
         sentences = _clean(amount(judged, static), missed, well=well)
+    told = list(sentences)
+    if count := sum(other.about == OTHER_PEOPLE for other in others):
+        lead = "1 file is of another person" if count == 1 else f"{count} files are of other people"
+        told = [f"{lead}, see below. {text}" for text in told] + told
     # sentences come ever shorter: the first that is short enough says most
-    text = next(text for text in sentences if len(text.split()) <= WORDS)
+    text = next(text for text in told if len(text.split()) <= WORDS)
     return Attention(min((own, *(other.level for other in others)), key=LEVELS.index), text, about=ABOUT)
 
 
@@ -247,7 +253,10 @@ def session_attention(result: SessionResult, diagnosis: Diagnosis | None = None)
 
 def open_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
     """Return every refusal, failed fit, load, warning, and check outside its limit, which points to its cause."""
-    found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
+    found = [
+        Attention("fail", without_path(why, file), file, OTHER_PEOPLE if isinstance(why, AnotherPerson) else "file")
+        for file, why in result.session.refused.items()
+    ]
     found += [Attention(_level(step), step.text, "", step.name) for step in result.steps if step.status != "done"]
     found += [Attention("note", NOT_WEIGHED, "", "weighing")] if result.weighed is None else []
     found += [

@@ -56,6 +56,8 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")  # What may differ between two sentences of one wording
 LIMIT_TOLD = ", should be "
 """Between the value of a check and its limit, in a sentence about it."""
+OTHER_PEOPLE = "another person"
+"""What a sentence on the file of another person is about."""
 
 
 class NotUsed(str):
@@ -64,6 +66,10 @@ class NotUsed(str):
 
 class WrongWeight(str):
     """A warning that the plates do not carry the declared weight."""
+
+
+class AnotherPerson(str):
+    """Why a file is refused that declares another person than the static trial's."""
 
 
 class Doubt(str):

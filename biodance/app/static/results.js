@@ -83,7 +83,7 @@ export async function showQuality(all) {
       : "",
     acts.length ? [h("h2", {}, "What needs a person"), list(acts)] : "",
     notes.length
-      ? h("details", {}, h("summary", {}, `Notes that ask nobody for anything: ${notes.length}`), list(notes))
+      ? h("details", {}, h("summary", {}, `Notes that need no action: ${notes.length}`), list(notes))
       : "",
     h("h2", {}, "Findings"),
     found.findings.length ? findings(found.findings, all) : h("p", {}, "No cause was found."),

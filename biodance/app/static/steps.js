@@ -3,6 +3,7 @@ import { ask, h, number, put, say, words } from "./dom.js";
 import { called, discard, EventEditor, isDraft, SIDES } from "./events.js";
 
 const kept = { trial: "" };
+const WHOLE = "no gait cycle from a foot's strike to its next, no squat, no rise and no jump";
 const HIGH = 240,
   ROW = 16;
 
@@ -139,7 +140,7 @@ export async function showSteps(all) {
 function cycles(row, moved, add) {
   // every repetition, to be switched off
   if (!moved) return h("p", {}, "Run the session to see its steps.");
-  if (!moved.cycles.length) return h("p", {}, "No step, squat or rise was found in it.");
+  if (!moved.cycles.length) return h("p", {}, `It holds ${WHOLE}.`);
   return h(
     "table",
     { cls: "stack" },
@@ -299,7 +300,7 @@ function byHand({ view, name, edit }, row, editor, at, draw) {
 
 function timeLine(row, forces, editor, onspan) {
   const wide = Math.min(1000, Math.max(340, innerWidth - 40)), // so that its letters are as large as others
-    ticks = wide < 600 ? 4 : 10;
+    few = wide < 600 ? 4 : 10;
   const [begin, end] = forces.ends_s,
     most = Math.max(100, ...forces.plates.flatMap((one) => one.force_n.filter((f) => f !== null)));
   const x = (t) => ((t - begin) / Math.max(end - begin, 1e-9)) * wide,
@@ -339,10 +340,12 @@ function timeLine(row, forces, editor, onspan) {
         "stroke-dasharray": one.down ? null : "4 3",
       }),
     );
-  for (let k = 0; k <= ticks; k++) {
-    const t = begin + (k / ticks) * (end - begin);
-    parts.push(h("text", { x: Math.min(x(t), wide - 34), y: HIGH + 3 * ROW + 12 }, `${t.toFixed(2)}`));
+  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((one) => (end - begin) / one <= few) || 200;
+  for (let t = Math.ceil(begin / step) * step; t < end; t += step) {
+    const at = { x: x(t), y: HIGH + 3 * ROW + 12, "text-anchor": x(t) < 12 ? "start" : "middle" };
+    if (x(t) < wide - 24) parts.push(h("text", at, t.toFixed(step < 1 ? 1 : 0)));
   }
+  parts.push(h("text", { x: wide - 4, y: HIGH + 3 * ROW + 12, "text-anchor": "end" }, "s"));
   parts.push(h("text", { x: wide - 70, y: 14 }, `${most.toFixed(0)} N`));
   const mark = h("rect", { y: 0, height: HIGH + 3 * ROW, width: 0, fill: "#f59e0b44" });
   const picture = h(

@@ -14,6 +14,8 @@ const ROLES = {
   skip: "skip: not used",
 };
 
+const DIGITS = { mass_kg: 2, height_m: 3, age: 1 };
+
 function toNumber(text) {
   // null for an empty field; a decimal comma is taken, other text goes to the server as it is
   const plain = text.trim().replace(",", ".");
@@ -23,9 +25,9 @@ function toNumber(text) {
 
 function subject(view, edit) {
   const person = view.subject;
-  const field = (key, text, digits) => {
+  const field = (key, text) => {
     const one = person[key],
-      shown = one.value === null ? "" : String(Number(one.value.toFixed(digits)));
+      shown = one.value === null ? "" : String(Number(one.value.toFixed(DIGITS[key])));
     return h(
       "label",
       { cls: one.guessed ? "guess-word" : "" },
@@ -84,10 +86,10 @@ function subject(view, edit) {
     h(
       "div",
       { cls: "fields" },
-      field("mass_kg", "Mass (kg)", 2),
-      field("height_m", "Stature (m)", 3),
+      field("mass_kg", "Mass (kg)"),
+      field("height_m", "Stature (m)"),
       sex,
-      field("age", "Age (years)", 1),
+      field("age", "Age (years)"),
       prosthesis,
     ),
     devices(view, edit),
@@ -163,7 +165,7 @@ function trialRow(row, view, edit) {
     h(
       "td",
       { cls: "n", "data-label": "Time" },
-      row.name ? `${number(row.seconds, 2)} s at ${number(row.rate_hz, 0)} Hz` : "–",
+      !row.name ? "–" : row.seconds > 0 ? `${number(row.seconds, 2)} s at ${number(row.rate_hz, 0)} Hz` : "1 frame",
     ),
     h("td", { "data-label": "Markers" }, row.name ? String(row.markers) : "–"),
     h("td", { "data-label": "Plates" }, row.name ? row.plates.join(", ") || "none" : "–"),
@@ -196,6 +198,10 @@ export function showTrials({ panel, view, edit }) {
     sex = view.subject.sex;
   const guesses = open.map((row) => [["trials", row.stem, "role"], row.role]);
   if (sex.guessed) guesses.push([["subject", "sex"], sex.value]);
+  for (const key of ["mass_kg", "height_m"]) {
+    const { guessed, value } = view.subject[key];
+    if (guessed && value !== null) guesses.push([["subject", key], Number(value.toFixed(DIGITS[key]))]);
+  }
   const notes = view.notes.filter((one) => one);
   put(
     panel,

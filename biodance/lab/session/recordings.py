@@ -25,7 +25,7 @@ from biodance.lab.readers import Reader, extensions, read_head, sniffed
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.session.subject import declared
 from biodance.records import Role, Trial, grouped
-from biodance.records.attention import Doubt
+from biodance.records.attention import AnotherPerson, Doubt
 
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
 
@@ -330,9 +330,11 @@ def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Tr
             if max(value / right, right / value) > alike:
                 strangers.setdefault(
                     trial.source.path.name,
-                    f"declares another person: {of} {value:.4g} {unit}, but {right:.4g} {unit} in the static trial "
-                    f"{static.name}. Move it to that person's session; if it is the same one, write "
-                    f"{'mass_kg' if unit == 'kg' else 'height_m'} in session.toml.",
+                    AnotherPerson(
+                        f"declares another person: {of} {value:.4g} {unit}, but {right:.4g} {unit} in the static trial "
+                        f"{static.name}. Move it to that person's session; if it is the same one, write "
+                        f"{'mass_kg' if unit == 'kg' else 'height_m'} in session.toml."
+                    ),
                 )
     return [trial for trial in trials if trial.source.path.name not in strangers], strangers
 

@@ -119,7 +119,8 @@ def _told(found: Repetitions, values: Mapping[str, Spread]) -> str:
     counts = Counter(one.side for one in found.good)
     sides = ", ".join(f"{counts[side]} {side}" for side in SIDES if counts[side])
     trials = f"{len(found.trials)} trial{'s' * (len(found.trials) != 1)}"
-    number, pace = f"{sides or len(found.good)} {_COUNTED[found.kind]}", ""
+    what = _COUNTED[found.kind].removesuffix("s" if len(found.good) == 1 else "")
+    number, pace = f"{sides or len(found.good)} {what}", ""
     if "speed" in values:
         speed, cadence = format_number(values["speed"].mean, 2), format_number(values["cadence"].mean, 0)
         pace = f"{speed} m/s, {cadence} steps a minute: "
