@@ -24,19 +24,29 @@ def walk() -> Contact:
 @pytest.mark.parametrize("heavier", [0.0, 0.1])
 def test_a_step_that_lacks_more_than_the_others_is_half_beside_whatever_the_declared_mass(heavier: float) -> None:
     lacks = (0.02, 0.015, 0.1, 0.5)
-    one, two, three, four = (FeetDown(10 * k, 10 * k + 5, RIGHT, lack + heavier) for k, lack in enumerate(lacks))
+    one, two, three, four = (
+        FeetDown(10 * k, 10 * k + 5, RIGHT, ("plate1",), lack + heavier) for k, lack in enumerate(lacks)
+    )
     assert half_steps([(one, two), (three,), (), (four,)]) == ((), (three,), (), (four,))
 
 
 def test_a_plate_that_reads_too_much_accuses_no_other_step() -> None:
-    usual, heavy = FeetDown(0, 5, LEFT, 0.02), FeetDown(10, 15, RIGHT, -0.3)
+    usual, heavy = (FeetDown(0, 5, LEFT, (name,), lacks) for name, lacks in (("plate1", 0.02), ("plate2", -0.3)))
     assert half_steps([(usual, heavy)]) == ((),)
     assert half_steps([()]) == ((),)
 
 
+def test_a_plate_that_lacks_in_all_its_steps_reads_too_little_and_accuses_no_foot() -> None:
+    whole, weak = FeetDown(0, 5, LEFT, ("plate1",), 0.02), FeetDown(10, 15, RIGHT, ("plate2",), 0.3)
+    assert half_steps([(whole, weak), (weak,)]) == ((), ())
+    # Who stands still tells nothing of one plate alone.
+    standing = FeetDown(0, 50, BOTH, ("plate1", "plate2"), 0.13)
+    assert half_steps([(whole,), (standing,)]) == ((), (standing,))
+
+
 def test_all_that_a_foot_half_beside_is_down_is_not_measured() -> None:
     whole = walk()
-    half = without(whole, (FeetDown(7, 10, RIGHT, 0.32),))
+    half = without(whole, (FeetDown(7, 10, RIGHT, ("plate1",), 0.32),))
     assert half.half == (LeftOutSpan(0.5, 1.1, "right"),)
     assert half.measured.tolist() == [True] * 5 + [False] * 7
     assert not half.told[:, 0].any()
@@ -50,5 +60,7 @@ def test_all_that_a_foot_half_beside_is_down_is_not_measured() -> None:
 
 
 def test_who_stands_half_beside_is_told_of_both_feet() -> None:
-    assert told_of((FeetDown(0, 9, BOTH, 0.125),)).startswith("both feet may stand partly beside")
-    assert told_of((FeetDown(0, 9, LEFT, 0.125), FeetDown(9, 12, LEFT, 0.07))).endswith("12 % of the weight")
+    assert told_of((FeetDown(0, 9, BOTH, ("plate1", "plate2"), 0.125),)).startswith("both feet may stand partly beside")
+    assert told_of(
+        tuple(FeetDown(9 * k, 9 * k + 9, LEFT, ("plate1",), lacks) for k, lacks in enumerate((0.125, 0.07)))
+    ).endswith("12 % of the weight")

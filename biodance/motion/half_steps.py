@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from biodance.lab.markers.upright import is_still
 from biodance.motion.contact import Contact, flight, share_lacking
 from biodance.records import SIDES, LeftOut, LeftOutSpan, Mask, Trial, runs
 
@@ -26,19 +27,21 @@ _LOADED = 0.05  # share of the weight from which on a plate carries somebody
 
 
 class FeetDown(NamedTuple):
-    """Frames ``start`` to ``stop`` in which the same ``feet`` (2,) are down, all on plates whose place the file does
-    not tell; ``lacks`` which share of the weight these lack meanwhile, on average.
+    """Frames ``start`` to ``stop`` in which the same ``feet`` (2,) are down, all on ``plates`` whose place the file
+    does not tell; ``lacks`` which share of the weight these lack meanwhile, on average.
     """
 
     start: int
     stop: int
     feet: Mask
+    plates: tuple[str, ...]
     lacks: float
 
 
 def stances(trial: Trial, contact: Contact, *, weight: float) -> tuple[FeetDown, ...]:
     """Return the stances of a prepared trial on plates of unknown place; ``weight`` N of the body, NaN = unknown: none.
-    Where one foot ever stands alone, those of both are passages between such stances, and are not asked.
+    Those of both feet only of who stands still: else they are passages between steps, or a movement on both, which
+    tells a wrong plate by what each of them carries.
 
     None of who flies: the parabola that tells the acceleration is longer than a step of running; none where a chair or
     a rail carries at times.
@@ -54,19 +57,25 @@ def stances(trial: Trial, contact: Contact, *, weight: float) -> tuple[FeetDown,
     changes = np.flatnonzero(np.diff(contact.touching @ np.array([1, 2]), prepend=-1, append=-1))
     found = []
     for start, stop in pairwise(changes):
-        feet, on = contact.touching[start], np.any(contact.on_plate[start:stop, :, unplaced], axis=2)
-        if feet.any() and on[:, feet].all() and stop - start >= _LONG / step:
-            found.append(FeetDown(int(start), int(stop), feet, float(lacks[start:stop].mean())))
-    alone = tuple(one for one in found if not one.feet.all())
-    return alone or tuple(found)
+        feet, on = contact.touching[start], contact.on_plate[start:stop] & unplaced
+        if feet.any() and on.any(axis=2)[:, feet].all() and stop - start >= _LONG / step:
+            plates = tuple(plate.name for plate, under in zip(trial.plates, on.any(axis=(0, 1)), strict=True) if under)
+            found.append(FeetDown(int(start), int(stop), feet, plates, float(lacks[start:stop].mean())))
+    return tuple(found) if is_still(trial) else tuple(one for one in found if not one.feet.all())
 
 
 def half_steps(every: Sequence[tuple[FeetDown, ...]]) -> tuple[tuple[FeetDown, ...], ...]:
     """Return, trial by trial, the stances of a session in which a foot is partly beside its plate: they lack more than
-    the one that lacks least, so that a wrong weight, which all lack alike, accuses none.
+    the one that lacks least, so that a wrong weight, which all lack alike, accuses none, and more than other steps on
+    the same plate.
     """
     least = max(0.0, min((one.lacks for some in every for one in some), default=0.0))
-    return tuple(tuple(one for one in some if one.lacks > least + _MORE) for some in every)
+    # Plates that carried some step whole: one that lacks in all its steps reads too little.
+    whole = {one.plates for some in every for one in some if not one.feet.all() and one.lacks <= least + _MORE}
+    return tuple(
+        tuple(one for one in some if one.lacks > least + _MORE and (one.feet.all() or one.plates in whole))
+        for some in every
+    )
 
 
 def without(contact: Contact, some: tuple[FeetDown, ...]) -> Contact:
