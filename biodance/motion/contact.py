@@ -399,7 +399,7 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: _FeetOnGround) -> Cont
     unplaced = [plate.name for plate in trial.plates if not plate.placed]
     nowhere = (
         f"Where {', '.join(unplaced)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
-        f"pressure is under it, and a foot partly beside its plate cannot be seen."
+        f"pressure is under it, and one partly beside its plate is seen only by the weight that is lacking."
     )
     counts = Counter({one.text: int(one.frames.sum()) for one in found if one.frames.any()})
     first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
