@@ -22,7 +22,7 @@ def walk() -> Contact:
 
 
 @pytest.mark.parametrize("heavier", [0.0, 0.1])
-def test_a_step_that_lacks_more_than_the_others_is_half_beside_whatever_the_declared_mass(heavier: float) -> None:
+def test_a_step_that_lacks_more_is_half_beside_whatever_the_mass(heavier: float) -> None:
     lacks = (0.02, 0.015, 0.1, 0.5)
     one, two, three, four = (
         FeetDown(10 * k, 10 * k + 5, RIGHT, ("plate1",), lack + heavier) for k, lack in enumerate(lacks)
@@ -36,7 +36,7 @@ def test_a_plate_that_reads_too_much_accuses_no_other_step() -> None:
     assert half_steps([()]) == ((),)
 
 
-def test_a_plate_that_lacks_in_all_its_steps_reads_too_little_and_accuses_no_foot() -> None:
+def test_a_plate_that_lacks_in_all_its_steps_accuses_no_foot() -> None:
     whole, weak = FeetDown(0, 5, LEFT, ("plate1",), 0.02), FeetDown(10, 15, RIGHT, ("plate2",), 0.3)
     assert half_steps([(whole, weak), (weak,)]) == ((), ())
     # Who stands still tells nothing of one plate alone.
