@@ -96,7 +96,7 @@ def without(contact: Contact, some: tuple[FeetDown, ...]) -> Contact:
     measured = contact.measured & ~frames
     said = (
         f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates.",
-        f"Left out, {int(frames.sum())} of {frames.size}: {told_of(some)}.",
+        f"Left out, {int(frames.sum())} of {frames.size}: a foot may stand partly beside a plate of unknown place.",
     )
     beside = contact.left_out.get(LeftOut.FOOT_BESIDE, np.zeros_like(frames))
     return replace(

@@ -212,8 +212,8 @@ def recording(
         if feet
     )
     pelvis = pelvis_path(trial.markers, known)
-    whole = (step for step in steps if not any(step.side == one.side and one.holds(step.middle) for one in half))
-    steps = tuple(sorted(whole, key=lambda step: step.middle))
+    beside = {step for step in steps for one in half if one.side == step.side and one.start <= step.middle <= one.end}
+    steps = tuple(sorted((step for step in steps if step not in beside), key=lambda step: step.middle))
     return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass), declared, half)
 
 

@@ -62,17 +62,13 @@ class Defect:
 
 @dataclass(frozen=True)
 class LeftOutSpan:
-    """Seconds ``start`` to ``end`` left out, by the analyst of a trial: of a ``side`` its cycles, of "" forces and all
+    """Seconds ``start`` to ``end`` left out, in a trial by the analyst: of a ``side`` its cycles, of "" forces and all
     cycles.
     """
 
     start: float
     end: float
     side: str = ""
-
-    def holds(self, time: float) -> bool:
-        """Return whether a ``time`` s lies in it, both ends included."""
-        return self.start <= time <= self.end
 
     def __str__(self) -> str:
         return f"{self.start:g} to {self.end:g} s{f' ({self.side})' if self.side else ''}"
