@@ -198,8 +198,9 @@ _CycleKind = Literal["gait", "squat", "sit_to_stand", "jump"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 4.0
-"""s of a gait cycle. After a stroke people walk as slowly as 0.23 m/s (Wu et al. 2019, doi:10.1038/s41598-019-54271-2):
-with steps of 0.3 m that is 2.6 s."""
+"""s of a gait cycle. After a stroke who walks at home alone is slower than 0.4 m/s (Perry et al. 1995,
+doi:10.1161/01.STR.26.6.982): with steps of 0.3 m a cycle takes 1.5 s there, and 3 s at half that speed.
+"""
 _STOOD = 2.0
 """Times the middle cycle of its trial from which somebody has stood between two steps."""
 _DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at least
