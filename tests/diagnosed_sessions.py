@@ -1,6 +1,5 @@
 """Sessions that obey their model but for what a test hides, as diagnosis sees them: no files, no markers, one plate."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,7 +8,6 @@ from scipy.fft import idct
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from biodance.body.human.human import human
-from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.problem import TrialWindow
 from biodance.effects import wrench_about_origin
 from biodance.motion.dynamics import predict_wrench
@@ -120,17 +118,6 @@ def offset(newton: float):
 def gain(share: float):
     """Return a hiding of a gain of Fz that is too large by ``share``."""
     return about_plate(lambda local, session: local * (1 + share * np.eye(6)[2]))
-
-
-def redrawn(fitted, rng: np.random.Generator, *, unlike: float = 1.0, loud: float = 1.0, signs=1.0):
-    """Return a fit whose data are drawn from its own model: a body ``unlike`` times as far from the table as people
-    are, noise ``loud`` times as large; ``signs`` of the columns.
-    """
-    posterior = fitted.posterior
-    u = rng.normal(size=posterior.X.shape[1]) * signs
-    u[: fitted.problem.factor.shape[1]] *= unlike
-    y = posterior.X @ u + loud * rng.normal(size=len(posterior.y))
-    return replace(fitted, posterior=LinearPosterior.for_target(posterior.X, posterior.factor, y))
 
 
 def about_plate(change):

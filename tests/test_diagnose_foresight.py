@@ -9,8 +9,8 @@ from rich.console import Console
 from small_dances import small_dance
 
 from biodance.dance.expectation import expect
-from biodance.diagnosis.foresight import foresee, planned, session_of
 from biodance.effects import effects
+from biodance.inference.foresight import foresee, planned, session_of
 from biodance.report.pages.diagnosis import foresight_page
 from biodance.report.tables.diagnosis import FIRST, foresight_document, seen_causes
 from biodance.report.terminal import print_foresight

@@ -5,24 +5,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, windows
-from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, log_priors, removed, slopes
 from biodance.diagnosis.consequence import NAMED
-from biodance.diagnosis.evidence import linear_posterior, smallest_detectable, surely_reached
 from biodance.diagnosis.learning import Null, learn_tolerances
-from biodance.diagnosis.model import model
-from biodance.diagnosis.observability import (
+from biodance.diagnosis.problem import problem
+from biodance.effects import Effect, Parameter, effect
+from biodance.inference.observability import (
     Visibility,
     after_calibration,
     detection_limits,
     placing_leaves,
+    smallest_detectable,
+    surely_reached,
     unit_directions,
     visibility,
 )
-from biodance.diagnosis.problem import problem
-from biodance.effects import Effect, Parameter, effect
+from biodance.inference.rows import rows_of
+from biodance.inference.scales import nominal
+from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
 
@@ -32,34 +34,20 @@ def log_bayes_factor(s: np.ndarray, G: np.ndarray) -> float:
     return 0.5 * float(s @ np.linalg.solve(inner, s)) - 0.5 * float(np.linalg.slogdet(inner)[1])
 
 
-def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
-    rng = np.random.default_rng(0)
-    X, Z, y = rng.normal(size=(30, 5)), rng.normal(size=(30, 2)), rng.normal(size=30) * 2
-    posterior = linear_posterior(X, y)
-    s, G = posterior.score(Z)
-    plain = np.eye(30) + X @ X.T
-    ratio = multivariate_normal(np.zeros(30), plain + Z @ Z.T).logpdf(y) - multivariate_normal(
-        np.zeros(30), plain
-    ).logpdf(y)
-    assert log_bayes_factor(s, G) == pytest.approx(ratio)
-    both = np.concatenate([X, Z], axis=1)
-    mean = np.linalg.solve(both.T @ both + np.eye(7), both.T @ y)
-    np.testing.assert_allclose(np.linalg.solve(np.eye(2) + G, s), mean[5:])
-
-
 @pytest.mark.parametrize("width", [1, 3])
 def test_the_smallest_size_is_found_in_95_of_100_recordings(width: int) -> None:
     rng = np.random.default_rng(1)
     X, Z = rng.normal(size=(200, 8)), 0.3 * rng.normal(size=(200, width))
-    _, G = linear_posterior(X, np.zeros(200)).score(Z)
+    # With u of X and the noise unit normal: y ~ N(size Z way, C).
+    free = Z.T @ np.linalg.inv(np.eye(200) + X @ X.T)
+    G = free @ Z
     way = np.ones(width)
     size = smallest_detectable(G, way, 6.0)
     assert surely_reached(G, size * G @ way) == pytest.approx(6.0)
     found = 0
     for _ in range(2000):
         y = X @ rng.normal(size=8) + rng.normal(size=200) + size * Z @ way
-        s, _ = linear_posterior(X, y).score(Z)
-        found += log_bayes_factor(s, G) > 6.0
+        found += log_bayes_factor(free @ y, G) > 6.0
     assert found / 2000 == pytest.approx(0.95, abs=0.03)
     assert smallest_detectable(np.zeros((1, 1)), np.ones(1), 6.0) == float("inf")
 
@@ -69,9 +57,14 @@ def put():
     return problem(body(), windows(3, trials=2))
 
 
+def searched(put, causes):
+    """Return the search for ``causes`` without observations."""
+    return Search.of(rows_of(put, causes, known(), None), causes)
+
+
 def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
-    causes = candidates(put, ("plate_offset",))
-    left = model(put, causes, known()).posterior.residual[: put.wrench_rows]
+    search = searched(put, candidates(put, ("plate_offset",)))
+    left = at_scales(search, hypothesis(search, ()), nominal(search.rows)).left[: put.wrench_rows]
     assert np.mean(left**2) == pytest.approx(0.9, abs=0.15)
 
 
@@ -112,7 +105,8 @@ def test_a_load_is_spanned_by_mass_and_place(put) -> None:
 
 def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:
     causes = candidates(put, ("plate_gain",))
-    seen = visibility(model(put, causes, known()), causes)
+    search = searched(put, causes)
+    seen = visibility(search, nominal(search.rows))
     limits = {row.target: row.limit for row in detection_limits(seen, put.cases[0].body)}
     for one in causes:
         size = np.array([limits[one.effect.target]])
@@ -170,7 +164,8 @@ def test_the_limit_of_what_saturates_lies_where_it_is_seen(put) -> None:
     """A cause of size a acts like a / (1 + a / most) of one in proportion, and never like more than ``most``."""
     for most in (1e6, 4.0, 0.01):
         (cause,) = candidates(put, {"saturating": type("Saturating", (Saturating,), {"most": most})()})
-        seen = visibility(model(put, (cause,), known()), (cause,))
+        search = searched(put, (cause,))
+        seen = visibility(search, nominal(search.rows))
         need = float(np.log(NAMED / (1 - NAMED))) - log_priors((cause,))[cause.names]
         straight = smallest_detectable(seen.G, unit_directions(cause)[0], need)
         true = straight / (1 - straight / most) if straight < most else np.inf

@@ -14,8 +14,8 @@ from scipy.stats import multivariate_normal
 from biodance.body.human.scaling import measure_static
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.tables.error_sizes import error_size
-from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
+from biodance.inference.observability import placing_leaves
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
 from biodance.motion.ik.functional_joints import functional_joints

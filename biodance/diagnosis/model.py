@@ -1,4 +1,4 @@
-"""The problem under its tolerances, with no cause: whitened rows, and columns of all that is no fault."""
+"""The problem under its tolerances: whitened rows, and columns of all that is no fault."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
-from biodance.diagnosis.evidence import LinearPosterior, linear_posterior
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
@@ -16,28 +15,6 @@ from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.sources import joint_of
 from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """``problem`` under its ``tolerances``, with no cause: ``posterior`` about all that is no fault, and what is
-    ``expected`` (r,) of a session without fault, which is taken off its target.
-    """
-
-    problem: Problem
-    tolerances: Tolerances
-    posterior: LinearPosterior
-    expected: Array
-
-    @property
-    def phi(self) -> Array:
-        """(10N,) posterior mean of the parameters."""
-        # phi = phi0 + S u.
-        return self.problem.prior.phi + self.problem.factor @ self.posterior.mean[: self.problem.factor.shape[1]]
-
-    def white(self, rows: Array, *, out: Array | None = None) -> Array:
-        """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
-        return white(self.problem, self.tolerances, rows, out=out)
 
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
@@ -108,35 +85,9 @@ def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
     )
 
 
-def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
-    """Return the model without any cause; those of ``causes`` with a learned size are tolerances as well."""
-    known = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
-    both = np.concatenate([problem.sip, *known.parts, problem.target[:, None]], axis=1)  # the largest array, made once
-    columns = both[:, problem.sip.shape[1] : -1]
-    columns *= known.scale
-    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
-    sizes = np.array([tolerances.size(key) for key in known.keys])
-    columns *= sizes
-    # Target less what is expected, whitened together with the columns.
-    both[:, -1] -= expected
-    both = white(problem, tolerances, both, out=both)
-    return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected)
-
-
 def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
     """Return all causes to search for, and those that are not searched for but keep their tolerance."""
     family = effects(chosen)
     return candidates(
         problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
     )
-
-
-def build_model(
-    problem: Problem,
-    tolerances: Tolerances,
-    chosen: Chosen[Effect],
-    every: tuple[Candidate, ...] | None = None,
-) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without any cause, and the causes to search for; all others keep their tolerances."""
-    family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
-    return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)

@@ -9,8 +9,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.consequence import NAMED
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
-from biodance.diagnosis.model import build_model, causes_of
-from biodance.diagnosis.observability import detection_limits, hidden, visibility
+from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.spectrum import power_about
@@ -20,6 +19,7 @@ from biodance.inference.columns import VisibleColumns
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
+from biodance.inference.observability import detection_limits, hidden, visibility
 from biodance.inference.own_noise import own_noise
 from biodance.inference.rows import Rows, rows_of, with_observed
 from biodance.inference.scales import bare, fit, nominal, prior_sd
@@ -87,10 +87,10 @@ def judge(
     else:
         every = with_observed((), evidence, asked, of=seen.problem.cases[0] if seen else None)
         rows = rows_of(None, every, known, evidence)
-    if seen is not None:
-        bare = _with_limits(bare, seen, known, asked)
-        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     search, posterior = _inferred(rows, every, asked, evidence)
+    if seen is not None:
+        bare = _with_limits(bare, seen.problem, search, posterior)
+        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     causes = search.causes
     found = decide(search, posterior, bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
@@ -170,13 +170,13 @@ def is_moving(case: Case) -> bool:
     return case.trial.role != "static" and bool(away.max() > case.trial.settings.standing.still)
 
 
-def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[str, Cause]) -> Diagnosis:
-    """Return the diagnosis with the smallest sizes of all causes that the session would show."""
-    kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
-    first, causes = build_model(seen.problem, known, kinds, seen.causes)
-    limits = detection_limits(visibility(first, causes), seen.problem.cases[0].body)
+def _with_limits(bare: Diagnosis, seen: Problem, search: Search, posterior: Posterior) -> Diagnosis:
+    """Return the diagnosis with the smallest sizes of all causes that the session would show, at the scales by which it
+    was decided: where an unknown cause is left, only what is larger is seen.
+    """
+    limits = detection_limits(visibility(search, posterior.best.fit.scales), seen.cases[0].body)
     rows = tuple(sorted(limits, key=lambda row: row.limit / row.typical))
-    return replace(bare, limits=rows, unobservable=hidden(limits), notes=(*bare.notes, *seen.problem.notes))
+    return replace(bare, limits=rows, unobservable=hidden(limits), notes=(*bare.notes, *seen.notes))
 
 
 def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosis:

@@ -39,7 +39,7 @@ from biodance.records import SIDES, Array, Markers, Motion, Session, Subject
 from biodance.threads import one_thread
 
 if TYPE_CHECKING:
-    from biodance.diagnosis.foresight import Foresight
+    from biodance.inference.foresight import Foresight
 
 
 _BEYOND = np.radians(3.1)  # rad that joints go beyond a limit in a person's file of which nobody need decide
@@ -298,7 +298,7 @@ def foresee_dance(path: Path) -> tuple["Foresight", Dance, Expectation | None]:
     """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, the
     dance, and what it teaches of a person's masses (None of a robot's). Raises FileRefused: the file is no dance.
     """
-    from biodance.diagnosis.foresight import foresee, session_of
+    from biodance.inference.foresight import foresee, session_of
 
     dance = Dance.load(path)
     known = expect(dance, steps=1) if dance.body.markers.names else None

@@ -11,11 +11,13 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.candidates import candidates
-from biodance.diagnosis.model import model
 from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.effects import Case
 from biodance.errors import TrialRefused
+from biodance.inference.rows import rows_of
+from biodance.inference.scales import nominal
+from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
 from biodance.motion.contact import dilate, ground_contact, speeds
 from biodance.motion.dynamics import predict_wrench
@@ -62,19 +64,20 @@ def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: 
     known = replace(tolerances, sizes={key: size for key, size in tolerances.sizes.items() if key not in sought})
     # Of walks over two plates no more than 0.3 to 0.9 s are fully measured.
     put = problem(body, (window,), shortest=0.25)
-    found = model(put, candidates(put), known)
+    search = Search.of(rows_of(put, candidates(put), known, None), ())
+    base = at_scales(search, hypothesis(search, ()), nominal(search.rows))
     rows = put.spectrum.rows((_columns(put.cases[0], about),)).reshape(-1, 4)
     # The other rows (markers) do not feel where the plates lie.
     rows = np.concatenate([rows, np.zeros((len(put.target) - len(rows), 4))])
     # What parameters and tolerances explain is projected out (Schur complement).
-    vector, information = found.posterior.score(found.white(rows))
+    vector, information = search.score(base, search.rows.white(rows))
     # How far a first alignment can be off (m, m, rad, s) keeps a direction that nothing shows from running away.
     unknown = np.array([0.1, 0.1, np.radians(5.0), 0.05])
     return PoseEvidence(
         information + np.diag(unknown**-2.0),
         # residual + rows @ change is to vanish, hence the minus.
         -vector,
-        float(found.posterior.residual @ found.posterior.residual) / len(found.posterior.y),
+        float(base.left @ base.left) / len(base.left),
         put.wrench_rows,
     )
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Estimate
-from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import spaced
 from biodance.effects import Cause, DiscreteEffect
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
+from biodance.inference.foresight import TOLD, Foresight
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.report.tables.schema import Row, Schema
 

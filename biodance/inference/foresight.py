@@ -12,11 +12,15 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.consequence import Unobservable
-from biodance.diagnosis.model import build_model
-from biodance.diagnosis.observability import Visibility, detection_limits, hidden, visibility
+from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect
+from biodance.effects import effects as known_effects
+from biodance.inference.observability import Visibility, detection_limits, hidden, visibility
+from biodance.inference.rows import rows_of
+from biodance.inference.scales import nominal
+from biodance.inference.sets import Search
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Motion, Plate, Source, Trial
@@ -100,10 +104,12 @@ def foresee(
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
     put = problem(body, windows, chosen=effects)
-    found, causes = build_model(put, known, effects)
-    seen = visibility(found, causes)
-    rows = tuple(sorted(detection_limits(seen, body), key=lambda row: row.limit / row.typical))
-    return Foresight(rows, hidden(rows), pairs := _confusions(seen, rows), _changes(causes, rows, pairs))
+    every, family = causes_of(put, known, effects), known_effects(effects)
+    rows = rows_of(put, every, known, None)
+    search = Search.of(rows, tuple(one for one in every if one.names[0] in family))
+    seen = visibility(search, nominal(rows))
+    limits = tuple(sorted(detection_limits(seen, body), key=lambda row: row.limit / row.typical))
+    return Foresight(limits, hidden(limits), pairs := _confusions(seen, limits), _changes(seen.causes, limits, pairs))
 
 
 def planned(body: Body, motion: Motion, name: str) -> Trial:

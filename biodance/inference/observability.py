@@ -1,8 +1,14 @@
-"""What a session can see and what it cannot: from the movement alone, before any force is looked at.
+"""What a session can see and what it cannot, at the scales by which it was judged; of a movement that is only planned
+at those of any laboratory.
 
-With a cause of size a, the score is expected to be G a; all expected log Bayes factors are quadratic in a. So the size
-from which a cause is seen, the size from which it is told from every other cause, and the pairs that no size separates
-follow from G.
+With whitened rows y = X u + Z b + e, u and b unit normal (X everything that is no fault, Z the basis of one cause),
+A = 1 + X'X and G = Z'Z - Z'X A^-1 X'Z, the score s = Z'y - Z'X A^-1 X'y of a cause of size a is expected to be G a, and
+
+    log Bayes factor = -1/2 log |1 + G| + 1/2 s' (1 + G)^-1 s.
+
+All expected log Bayes factors are quadratic in a. So the size from which a cause is seen, the size from which it is
+told from every other cause, and the pairs that no size separates follow from G. What hides in the body's own parameters
+or in a tolerance leaves no trace in it.
 """
 
 from dataclasses import dataclass, replace
@@ -13,12 +19,13 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes, log_priors
+from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, log_priors
 from biodance.diagnosis.consequence import NAMED, Unobservable, least
-from biodance.diagnosis.evidence import smallest_detectable, surely_reached
-from biodance.diagnosis.model import Model
 from biodance.effects import unit_at
 from biodance.effects.joint_centre import JointCentre
+from biodance.inference.hypotheses import Hypothesis
+from biodance.inference.scales import Scales
+from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.motion.ik.functional_joints import fixed_point
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.records import Array
@@ -26,6 +33,8 @@ from biodance.records import Array
 LARGE = 4.0
 """A cause that is not seen at this many typical sizes is listed as one that this session cannot see."""
 
+_BELOW = 1.645
+"""Standard deviations below its mean that a normal variable passes with 95 %."""
 _SEARCHED, _STEPS = 300.0, 24
 """How far, and in how many steps, the limit of a cause is looked for whose effect is not in proportion to its size (a
 filter takes no more than there is).
@@ -35,13 +44,14 @@ filter takes no more than there is).
 @dataclass(frozen=True, eq=False)
 class Visibility:
     """``causes`` (C); ``G`` (k, k) information of all bases together, ``cuts`` where each cause's basis lies in it;
-    ``found`` the model without named causes that they are seen in.
+    ``search`` and the hypothesis without causes, ``base``, that they are seen in.
     """
 
     causes: tuple[Candidate, ...]
     G: Array
     cuts: tuple[slice, ...]
-    found: Model | None = None
+    search: Search | None = None
+    base: Hypothesis | None = None
 
     def seen(self, index: int) -> float:
         """Return the size, in units of the first parameter, from which cause ``index`` alone is named in 95 % of all
@@ -51,19 +61,20 @@ class Visibility:
         # Log odds of `NAMED` less the prior's.
         need = float(np.log(NAMED / (1 - NAMED))) - self._prior[one.names]
         size = max(smallest_detectable(self.G[cut, cut], way, need) for way in unit_directions(one))
-        if self.found is None or one.effect.linear or any(one.silent):
+        if self.search is None or self.base is None or one.effect.linear or any(one.silent):
             return size
-        return _really_seen(self.found, one, size, need)
+        return _really_seen(self.search, self.base, index, size, need)
 
     def felt(self, index: int) -> float:
         """Return the size, in units of the first parameter, from which cause ``index`` changes the wrench by what
-        matters; 0 for one that the markers show. Several forces or masses as in `seen`.
+        matters; 0 for one that the markers show, or only observations. Several forces or masses as in `seen`.
         """
-        if self.found is None:
+        problem = None if self.search is None else self.search.rows.problem
+        if problem is None or not self.causes[index].basis.any():
             return 0.0
         rows = self.causes[index].basis @ np.stack(unit_directions(self.causes[index]), axis=1).astype(float)
         with np.errstate(divide="ignore"):
-            return float((1.0 / self.found.problem.felt(rows)).max())
+            return float((1.0 / problem.felt(rows)).max())
 
     def separation(self, index: int) -> tuple[Array, Array]:
         """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a
@@ -130,16 +141,52 @@ class Visibility:
         return float(size.max(initial=0.0))
 
 
-def _really_seen(found: Model, one: Candidate, size: float, need: float) -> float:
+def _really_seen(search: Search, base: Hypothesis, index: int, size: float, need: float) -> float:
     """Return the size from which a cause not in proportion to its size surely passes ``need``; infinite if none."""
-    Z, first = found.white(one.basis.astype(float)), np.eye(len(one.silent))[0]
-    free = found.posterior.free(Z)
-    G = Z.T @ free
+    effect, Z = search.causes[index].effect, search.Z[:, search.cuts[index]]
+    first = np.eye(effect.typical.size)[0]
     for grown in size * np.geomspace(1.0, _SEARCHED, _STEPS) if np.isfinite(size) else ():
-        rows = changes(found.problem, one.effect, grown * first)
-        if surely_reached(G, found.white(rows[:, None])[:, 0] @ free) >= need:
+        added = search.rows.added(effect, grown * first)
+        # Products of what is added with the basis, beside everything that is no fault: the shift of the score.
+        _, G = search.score(base, np.column_stack([Z, added]))
+        if surely_reached(G[:-1, :-1], G[:-1, -1]) >= need:
             return float(grown)
     return float("inf")
+
+
+def surely_reached(G: Array, shift: Array) -> float:
+    """Return the log Bayes factor that a cause passes in 95 % of all recordings if it adds ``shift`` (k,) to the score.
+
+    With s ~ N(shift, G) and W = (1 + G)^-1 the factor has mean m and variance v, and is taken as normal:
+
+        m = 1/2 shift' W shift + 1/2 tr(W G) - 1/2 log |1 + G|,   v = shift' W G W shift + 1/2 tr(W G W G).
+    """
+    growth, bend, chance, spread = _moments(G, shift)
+    return growth + chance - _BELOW * float(np.sqrt(bend + spread))
+
+
+def _moments(G: Array, shift: Array) -> tuple[float, float, float, float]:
+    """Return what the shift adds to mean and variance of `surely_reached`, and what chance does."""
+    inner = np.linalg.inv(np.eye(len(G)) + G)
+    pull, share = inner @ shift, inner @ G
+    # At size zero E[s s'] = G: mean of the log factor 1/2 tr(G (1 + G)^-1) - 1/2 log|1 + G|.
+    chance = 0.5 * float(np.trace(share) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
+    return 0.5 * float(shift @ pull), float(pull @ G @ pull), chance, 0.5 * float(np.trace(share @ share))
+
+
+def smallest_detectable(G: Array, direction: Array, need: float) -> float:
+    """Return the multiple a of ``direction`` (k,) from which a cause passes ``need`` in 95 % of all recordings
+    (`surely_reached` with the shift a G direction, solved for a^2); infinite if it never does.
+    """
+    growth, bend, chance, spread = _moments(G, G @ direction)
+    if growth <= 1e-12:
+        return float("inf")
+    # growth a^2 - lack = below sqrt(bend a^2 + spread), squared: the larger root
+    lack, below = need - chance, _BELOW**2
+    # In x = a²: (growth x - lack)² = below (bend x + spread), a quadratic equation.
+    half = growth * lack + 0.5 * below * bend
+    root = half**2 - growth**2 * (lack**2 - below * spread)
+    return float(np.sqrt(max(half + np.sqrt(max(root, 0.0)), 0.0))) / growth
 
 
 def unit_directions(one: Candidate) -> list[Array]:
@@ -151,11 +198,10 @@ def unit_directions(one: Candidate) -> list[Array]:
     return [np.eye(width)[i] / (SCALE * one.effect.typical[k]) for i, k in enumerate(loud) if k in same]
 
 
-def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
-    """Return what ``found``, a model without named causes, lets every cause show."""
-    Z, cuts = bases_of(causes)
-    _, G = found.posterior.score(found.white(Z, out=Z))
-    return Visibility(causes, G, cuts, found)
+def visibility(search: Search, at: Scales) -> Visibility:
+    """Return what a session of these scales lets every cause of ``search`` show beside all that is no fault."""
+    base = at_scales(search, hypothesis(search, ()), at)
+    return Visibility(search.causes, search.score(base, search.Z)[1], search.cuts, search, base)
 
 
 def after_calibration(seen: Visibility, body: Body) -> Visibility:
