@@ -21,6 +21,8 @@ from biodance.records import Array
 
 SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
+IN_SET = 0.95
+"""Share of the posterior of its place that the set of a cause holds."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 _EMPTY = 50.0

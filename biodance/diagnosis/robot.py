@@ -1,19 +1,24 @@
 """What about a robot or its laboratory is not as drawn: encoder zeros, joints that give or have play, plate faults.
 
 Masses and all small errors that are usual count as in the identification. Beside them every cause is tried alone, much
-larger than usual: by how much the recording becomes more probable with it (evidence, nats). The best one is taken out
-of the recording, and the others are tried again. A cause is named only if the motion that was kept for validation, too,
-becomes more probable with it; causes that the recording cannot tell from it are named with it.
+larger than usual: by how much the recording becomes more probable with it (evidence, nats). The most probable one is
+taken out of the recording, and the others are tried again. A cause is named from the same probability on as a person's
+(`NAMED`), that it or one of its set is there, and only if the motion that was kept for validation becomes more probable
+with it, too.
 Each is a column: what a recording shows of it at unit size, and the recording without it.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.special import logsumexp
 
 from biodance.body.body import Body
-from biodance.effects import unit_of
+from biodance.diagnosis.candidates import IN_SET, TOGETHER
+from biodance.diagnosis.consequence import NAMED
+from biodance.effects import effects, unit_of
 from biodance.identification.mismatch import long_runs
 from biodance.identification.posterior import prior_factor
 from biodance.identification.robot import (
@@ -173,8 +178,10 @@ def _without(body: Body, one: AnyMotion, columns: _Columns, cause: RobotCause, a
     return replace(one, fit=replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - amount * error)))
 
 
-_CLEAR, _LIKE = 8.0, 3.0
-"""Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
+_PRIOR = 0.03
+"""Probability, before any data, that a robot has an encoder's zero off, a joint that gives, play, or a sole that gives,
+each shared by its places; those of a plate's causes stand in their effects (`Effect.prior`).
+"""
 _WORST = 4.0
 """Standard deviations of a cause that is there, beyond which none is believed: it would be seen without us."""
 _SHARED = 0.15
@@ -186,7 +193,8 @@ _MOST = 4
 @dataclass(frozen=True)
 class RobotFinding:
     """A ``cause``, its ``value`` ± ``sd`` in the cause's unit, the evidence ``gain`` and that on motion not used,
-    ``kept_gain`` (NaN without such), nats; ``rivals`` that would explain as much.
+    ``kept_gain`` (NaN without such), nats; the ``probability`` that it or one of its ``rivals``, the others of its set,
+    is there.
     """
 
     cause: RobotCause
@@ -194,6 +202,7 @@ class RobotFinding:
     sd: float
     gain: float
     kept_gain: float
+    probability: float
     rivals: tuple[RobotCause, ...] = ()
 
 
@@ -218,29 +227,43 @@ def robot_causes(
         every = _equations(sum(rest, first), noise)
         found, trials = _refined(body, found, trials, columns, every, here)
         gain, both = (_gains(A, b, here, columns.wide)[size:] for A, b in (fit, every))
-        best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
-        if best < 0 or len(found) == _MOST:
+        best, rivals, probability = _chosen(columns, both, both - gain, [one.cause for one in found])
+        if probability < NAMED or len(found) == _MOST:
             return tuple(found), trials
         # From now on this cause may be as large as one that is there.
         here[best] = np.hypot(columns.wide[best], here[best])
         later = float(both[best] - gain[best]) if kept else float("nan")
         cause = columns.causes[best]
         assert cause is not None
-        found.append(RobotFinding(cause, 0.0, 0.0, float(both[best]), later, rivals))
+        found.append(RobotFinding(cause, 0.0, 0.0, float(both[best]), later, probability, rivals))
         found, trials = _refined(body, found, trials, columns, every, here)
 
 
 def _chosen(
     columns: _Columns, gain: Array, later: Array, known: list[RobotCause]
-) -> tuple[int, tuple[RobotCause, ...]]:
-    """Return the column of the best cause (-1: none is clear) and the causes that cannot be told from it."""
+) -> tuple[int, tuple[RobotCause, ...], float]:
+    """Return the column of the most probable further cause, the others of its set (`IN_SET` of the posterior, and what
+    the data cannot tell from it), and the probability that one of them is there, of one more cause or none.
+    """
     free = np.array([one is not None and one not in known for one in columns.causes])
-    ranked = np.where(free & (later >= 0), gain, -np.inf)
-    best = int(np.argmax(ranked))
-    if not ranked[best] > _CLEAR:
-        return -1, ()
-    like = [columns.causes[k] for k in np.flatnonzero(ranked > ranked[best] - _LIKE) if k != best]
-    return best, tuple(one for one in like if one is not None)
+    odds = np.where(free & (later >= 0), gain + _log_priors(columns.causes), -np.inf)
+    # Bayes over "none" (log odds 0) and every cause alone.
+    share = np.exp(odds - logsumexp(np.append(odds, 0.0)))
+    best, kept, held = int(np.argmax(share)), list[int](), 0.0
+    for k in np.argsort(-share)[: int(np.isfinite(odds).sum())]:
+        if held < IN_SET * share.sum() or gain[k] >= gain[best] - TOGETHER:
+            kept.append(int(k))
+        held += share[k]
+    rivals = (columns.causes[k] for k in kept if k != best)
+    return best, tuple(one for one in rivals if one is not None), float(share[kept].sum())
+
+
+def _log_priors(causes: tuple[RobotCause | None, ...]) -> Array:
+    """Return (k,) the log odds of every cause before any data; 0 of a place, which is none."""
+    places, plates = Counter(one.kind for one in causes if one), effects()
+    prior = {kind: plates[kind].prior if kind in plates else _PRIOR for kind in places}
+    share = np.array([prior[one.kind] / places[one.kind] if one else 0.5 for one in causes])
+    return np.asarray(np.log(share / (1 - share)))
 
 
 def _refined(

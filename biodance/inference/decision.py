@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from biodance.diagnosis.candidates import TOGETHER, changes
+from biodance.diagnosis.candidates import IN_SET, TOGETHER, changes
 from biodance.diagnosis.consequence import NAMED, SUGGESTED, Adequacy, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
@@ -38,8 +38,6 @@ from biodance.uncertainty.tolerances import key_of
 
 _COUNTED = 1e-4
 """Probability below which it is not asked whether the causes of a set are large."""
-IN_SET = 0.95
-"""Share of the posterior of its place that the set of a cause holds."""
 _FAR = 3.0
 """Standard deviations of the logarithm of a scale beyond which body or soft tissue are unlike people."""
 _HABIT = 0.010

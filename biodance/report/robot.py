@@ -29,7 +29,8 @@ _ROBOT = Schema(
 )
 _IN_ROOT = Schema("", {"table": AGREEMENT_ROW.at("0"), "identified": AGREEMENT_ROW.at("1")})
 _CAUSE = Schema(
-    "cause=cause.kind where=cause.where value sd unit=cause.unit evidence_nats=gain evidence_on_kept_nats=kept_gain",
+    "cause=cause.kind where=cause.where value sd unit=cause.unit probability evidence_nats=gain "
+    "evidence_on_kept_nats=kept_gain",
     {"not_told_from": lambda one: [f"{rival.kind} {rival.where}" for rival in one.rivals]},
 )
 _MATCHED = Schema(
@@ -94,5 +95,5 @@ def print_robot_diagnosis(found: Row, console: Console) -> None:
     for one in found["diagnosis"]["findings"]:
         size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
         others = f"; it could also be {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
-        text = f"{spaced(one['cause'])}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
+        text = f"{spaced(one['cause'])}, {one['where']}: {size}, P = {one['probability']:.2f}{others}"
         print_line(console, text)
