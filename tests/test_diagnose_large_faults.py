@@ -195,6 +195,31 @@ def test_a_real_plate_that_reads_seven_tenths_in_one_trial_is_named_and_no_clock
         assert all(one.ok for one in FrameRate.check(seen))
 
 
+@pytest.mark.parametrize(("number", "too_much"), [(1, False), (2, False), (1, True)])
+def test_of_plates_that_weighed_the_person_one_reads_less_than_the_other(
+    number: int, too_much: bool, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody declared a mass, so that the weight of no trial is right; where the pressure lies tells the plates apart,
+    and only the mass which of the two is wrong. Without it the person is weighed again.
+    """
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    for source in sorted((data / "subject4").iterdir()):
+        if source.stem.removesuffix("_grf") in ("static1", "squats1", "squatsAsym1"):
+            (tmp_path / source.name).symlink_to(source)
+    share = 1 / 0.7 if too_much else 0.7
+    visit = changed(read_session(tmp_path), lambda plates: weak(plates, number=number, share=share))
+    (static,) = visit.of_role("static")
+    weighed = static.wrench.value[:, 2].mean() / static.settings.gravity
+    visit = replace(visit, subject=replace(visit.subject, mass=weighed))
+    found = diagnose_session(examine(visit))
+    less, more = ("plate2", "plate1") if (number == 2) != too_much else ("plate1", "plate2")
+    first = found.findings[0]
+    assert [(one.effect, one.target) for one in first.set] == [("plate_gain", less), ("plate_gain", more)]
+    assert first.trials == ()
+    assert first.parameters[0].value == pytest.approx(-0.3, abs=0.04)
+    assert {one.effect for one in found.findings} <= {"plate_gain", "toe_landmark"}
+
+
 def test_what_is_undone_is_the_recording_again():
     one = two_plates.session()
     wrong = changed(one, late(0.2), "squat_1")

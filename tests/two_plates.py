@@ -79,10 +79,10 @@ def late(seconds: float):
     return change
 
 
-def weak(plates: tuple[Plate, ...], number: int = 2) -> tuple[Plate, ...]:
-    """Let plate 2 (or that of another ``number``) read 0.7 of everything."""
+def weak(plates: tuple[Plate, ...], number: int = 2, share: float = 0.7) -> tuple[Plate, ...]:
+    """Let plate 2 (or that of another ``number``) read 0.7 (or another ``share``) of everything."""
     wrong = plates[number - 1]
-    wrong = replace(wrong, wrench=Wrench(wrong.wrench.time, 0.7 * wrong.wrench.value))
+    wrong = replace(wrong, wrench=Wrench(wrong.wrench.time, share * wrong.wrench.value))
     return (*plates[: number - 1], wrong, *plates[number:])
 
 

@@ -26,6 +26,8 @@ _SURE = 0.03
 _SIDEWAYS, _AGAIN = 0.004, 0.003
 """m: sd of the place of the pressure to the left of the table's centre of mass in standing and squats (clean ones of 4
 public laboratories lie 0.5 to 4 mm off, two simulated persons 4 to 6 mm), and between trials of a person."""
+_BESIDE = 3.0
+"""Standard deviations (`_SIDEWAYS`) from which pressure beside the body is no habit of a person."""
 _LASTS = 1.0
 """s that a trial tells: within a step or two the place wanders by 16 mm."""
 _NAMED, _TOLD = 4.0, 9.0
@@ -43,11 +45,23 @@ plate reads.
 
 @dataclass(frozen=True)
 class _Carried:
-    """Force on all plates over the need, how far left its place is (m), and by plate the gain that explains it."""
+    """Force on all plates over the need, how far left its place is (m), and by plate the gain that explains the force,
+    with how far left the place is then; by plate what it reads of its load to explain the place (`placed`), and the
+    force over the need then, both as logarithms.
+    """
 
     ratio: float
     off: float
     plates: dict[str, tuple[float, float]]
+    placed: dict[str, tuple[float, float]]
+
+
+def _carried(recorded: Recorded) -> dict[str, _Carried]:
+    """Return what the plates of each trial carry that lasts and that Newton weighs (`_carried_by_plates`)."""
+    newton = recorded.newton.items()
+    told = {name for name, one in newton if one.seconds >= _LASTS and one.mass_sd < _RIGHT * one.mass}
+    every = {case.trial.name: _carried_by_plates(case) for case in recorded.cases if case.trial.name in told}
+    return {name: one for name, one in every.items() if one is not None}
 
 
 def _carried_by_plates(case: Case) -> _Carried | None:
@@ -75,7 +89,8 @@ def _carried_by_plates(case: Case) -> _Carried | None:
         return None
     ahead = facing(case.body, case.motion)
     left, lacks = np.array([-ahead[1], ahead[0]]), need[2] - total[2]
-    found = {}
+    found, placed = {}, {}
+    off = float((_place(total) - _place(need)) @ left)
     for plate, wrench in zip(plates, own, strict=True):
         right = wrench[2] + lacks
         place = _place(wrench) if wrench[2] > _LOADED * need[2] else (plate.centre - middle)[:2]
@@ -84,7 +99,12 @@ def _carried_by_plates(case: Case) -> _Carried | None:
             # own place: mean by force.
             corrected = (total[2] * _place(total) + lacks * place) / need[2]
             found[plate.name] = float(wrench[2] / right - 1), float((corrected - _place(need)) @ left)
-    return _Carried(float(total[2] / need[2]), float((_place(total) - _place(need)) @ left), found)
+        # total off + more away = 0: what more on this plate puts the pressure of all under the body.
+        more = -total[2] * off / float((place - _place(need)) @ left)
+        if min(wrench[2] + more, wrench[2]) > 0:
+            share, weight = wrench[2] / (wrench[2] + more), (total[2] + more) / need[2]
+            placed[plate.name] = float(np.log(share)), float(np.log(weight))
+    return _Carried(float(total[2] / need[2]), off, found, placed)
 
 
 def _place(wrench: Array) -> Array:
@@ -137,16 +157,11 @@ class PlateGain(InstalledPlate):
         """Return the plates that read a tenth too much or too little in all channels: in all trials, where the body's
         mass may be wrong instead, or in some, where the others show that it is not.
         """
-        told = {
-            name for name, one in recorded.newton.items() if one.seconds >= _LASTS and one.mass_sd < _RIGHT * one.mass
-        }
-        found = {
-            c.trial.name: one
-            for c in recorded.cases
-            if c.trial.name in told and (one := _carried_by_plates(c)) is not None
-        }
+        found = _carried(recorded)
         wrong = {name: one for name, one in found.items() if abs(one.ratio - 1) > _RIGHT}
         right = [one.off for name, one in found.items() if name not in wrong]
+        if "mass" in recorded.session.subject.guessed and right and abs(np.mean(right)) > _BESIDE * _SIDEWAYS:
+            return cls._unlike(found)  # no trial is right: these plates weighed the person
         if right:
             each = ({name: one} for name, one in wrong.items())
             failed = [cls._reads(some, float(np.mean(right)), _AGAIN, tuple(some)) for some in each]
@@ -187,6 +202,31 @@ class PlateGain(InstalledPlate):
             "gain of whole plates", False, text, cls.name, plate, gain, "gain", "1",
             sd=_SURE, trials=trials, alike=tuple(alike),
         )  # fmt: skip
+
+    @classmethod
+    def _unlike(cls, found: Mapping[str, _Carried]) -> tuple[QualityCheck, ...]:
+        """Return the plate that reads another share of its loads than the others, if the pressure of all then lies
+        under the body in every trial, and weighs one person. Which of two it is, only the person's mass tells.
+        """
+        ranked = []
+        for name in next(iter(found.values())).placed:
+            each = np.array([one.placed[name] for one in found.values() if name in one.placed])
+            share = float(each[:, 0].mean())
+            # In proportion to how far the pressure of all lies beside the body, which trials repeat to `_AGAIN`.
+            near = abs(share) * _BESIDE * _AGAIN / abs(np.mean([one.off for one in found.values()]))
+            alike = len(each) == len(found) > 1 and bool((np.ptp(each, axis=0) < [near, 2 * _RIGHT]).all())
+            if alike and abs(np.expm1(share)) > _LARGE:
+                ranked.append((float(np.expm1(share)), name))
+        if not ranked:
+            return ()
+        gain, plate = min(ranked)
+        others = tuple((cls.name, name) for _, name in ranked if name != plate)
+        text = f"{plate} reads {1 + gain:.2f} times what the other plates read for the same load."
+        return (
+            QualityCheck(
+                "gain of whole plates", False, text, cls.name, plate, gain, "gain", "1", sd=_SURE, alike=others
+            ),
+        )
 
     @classmethod
     def undone(cls, trial: Trial, found: QualityCheck) -> Trial:

@@ -35,6 +35,7 @@ from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
 from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.c3d.write import write_trial
+from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates import faults
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, recorded_of, windows
@@ -164,6 +165,15 @@ def _undone(trial: Trial, found: Iterable[tuple[Cause, QualityCheck]]) -> Trial:
     return trial
 
 
+def _without_all(session: Session, found: Iterable[tuple[Cause, QualityCheck]]) -> Session:
+    """Return a session as read without what was found in it; a person whom its plates weighed is weighed again."""
+    trials, subject = tuple(_undone(trial, found) for trial in session.trials), session.subject
+    if "mass" in subject.guessed:
+        weighed = map(standing_mass, sorted(trials, key=lambda trial: trial.role != "static"))
+        subject = replace(subject, mass=next((mass for mass in weighed if mass is not None), float("nan")))
+    return replace(session, trials=trials, subject=subject)
+
+
 _ROUNDS = 3
 """How often it is looked again: with one fault undone, another one shows."""
 
@@ -195,8 +205,7 @@ def with_faults_undone(
             break
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
-        trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        again = replace(result.session, trials=trials)
+        again = _without_all(result.session, new)
         result = followed(again, reference=reference, known=result.placed.known, earlier=result)
         recorded = recorded_of(result)
     checks = (*mended.checks, *found)
