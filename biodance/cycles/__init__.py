@@ -34,7 +34,7 @@ from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
-from biodance.records import SIDES, Array, FootEvent, Mask, Motion, Sip, Trial
+from biodance.records import SIDES, Array, FootEvent, Mask, Motion, Plate, Sip, Trial
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -356,9 +356,10 @@ def trial_movement(
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
     force = cut.foot_events(feet, contact, trial.plates) if contact is not None and feet is not None else ()
     markers = cut.kinematic_events(body, motion)
+    markers = cut.that_may_touch(markers, contact) if contact is not None else markers
     events = cut.replaced_events(cut.joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
-    known_of_feet, shared = _known_feet(contact, motion.time.size)
+    known_of_feet, shared = _known_feet(contact, trial.plates, motion.time.size)
     jumped = cut.jumps(trial.name, motion, soles, centre, feet, known_of_feet, trial.plates)
     lifts = (one for one in cut.repetitions(trial.name, body, motion, soles) if not any(map(one.near, jumped)))
     found = (*cut.gait_cycles(trial.name, events), *lifts, *jumped)
@@ -396,13 +397,13 @@ def trial_movement(
     )
 
 
-def _known_feet(contact: Contact | None, frames: int) -> tuple[Mask, Mask]:
+def _known_feet(contact: Contact | None, plates: Sequence[Plate], frames: int) -> tuple[Mask, Mask]:
     """Return (T, 2) where the plates tell the force under each foot, nowhere without plates; and (T,) where both feet
-    are on one plate.
+    may be on one plate.
     """
     if contact is None:
         return np.zeros((frames, 2), dtype=bool), np.zeros(frames, dtype=bool)
-    return contact.told, np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
+    return contact.told, cut.on_one_plate(contact, plates)
 
 
 def _notes(cycles: Sequence[cut.Cycle], on_one: Sequence[cut.Cycle], contact: Contact | None) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ from biodance.body.body import Body
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
-from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Plate, Wrench, runs
-from biodance.settings import FORCE_DOWN, SHORTEST_CONTACT
+from biodance.records import SIDES, Array, FootEvent, LeftOutSpan, Mask, Motion, Plate, Wrench, contacts, runs
+from biodance.settings import FORCE_DOWN
 
 # Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
 # and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
@@ -33,18 +33,11 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
     to 34 ms early: where one of the ``plates`` under the foot passes it as recorded, too (`Plate.loaded`), that
     instant counts.
     """
-    events = []
+    events, shared = [], on_one_plate(contact, plates)
     for foot, side in enumerate(SIDES):
         wrench = feet[f"{side}_foot"]
-        # Over the same plate at the same time.
-        shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
-        loaded, shortest = np.nan_to_num(force) > FORCE_DOWN, SHORTEST_CONTACT * wrench.rate
-        # Gaps first, then contacts: a flicker joins the contact that it interrupts.
-        for value in (False, True):
-            for start, stop in runs(loaded == value):
-                if stop - start < shortest and start > 0 and stop < len(loaded):
-                    loaded[start:stop] = not value
+        loaded = contacts(wrench)
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
             if not (sure[i] and sure[i + 1]):
                 continue
@@ -56,6 +49,15 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
             time = own[np.argmin(np.abs(own - time))] if own.size else time
             events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
     return tuple(sorted(events, key=lambda event: event.time))
+
+
+def on_one_plate(contact: Contact, plates: Sequence[Plate]) -> Mask:
+    """Return (T,) where both feet may be on one plate that carries something: between two steps of a runner it is
+    empty.
+    """
+    return np.asarray(
+        np.any([contact.on_plate[..., k].all(axis=1) & contacts(one.wrench) for k, one in enumerate(plates)], axis=0)
+    )
 
 
 def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
@@ -109,6 +111,18 @@ def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
         events += [FootEvent(time, side, True, "markers") for time in strikes]
         events += [FootEvent(time, side, False, "markers") for time in leavings]
     return tuple(sorted(events, key=lambda event: event.time))
+
+
+def that_may_touch(events: Iterable[FootEvent], contact: Contact) -> tuple[FootEvent, ...]:
+    """Return the events without strikes of a foot that is in the air within `_TOGETHER` of them: who stands on one leg
+    swings the other.
+    """
+
+    def touches(one: FootEvent) -> bool:
+        near = np.abs(contact.time - one.time) < _TOGETHER
+        return bool(contact.touching[near, SIDES.index(one.side)].any())
+
+    return tuple(one for one in events if not one.down or touches(one))
 
 
 def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:

@@ -204,7 +204,7 @@ class LeftOutBecause(Enum):
     """Why a curve of a repetition counts in no mean."""
 
     SHARED_PLATE = "shared_plate"
-    """Both feet stood on one plate for a part of it, so that no plate tells what this foot carried."""
+    """Both feet may have stood on one plate for a part of it, so that no plate tells what this foot carried."""
     SPIKE = "spike"
     """It leaves all others of its kind far behind: a marker or a plate jumped."""
     TURN = "turn"
@@ -332,8 +332,8 @@ class Repetitions:
 
     @property
     def runs(self) -> bool:
-        """Whether most strides have a flight."""
-        return 2 * sum("flight_time" in one.values for one in self.strides) > len(self.strides)
+        """Whether these are strides, most of which have a flight: a jump has one, too."""
+        return self.kind == "gait" and 2 * sum("flight_time" in one.values for one in self.strides) > len(self.strides)
 
     @cached_property
     def speeds(self) -> tuple[float, float] | None:

@@ -126,11 +126,11 @@ class Together:
     first_sd: float
 
     def __str__(self) -> str:
-        first, *rest = (spaced(name) for name in self.segments)
+        first, *others, last = (spaced(name) for name in self.segments)
         return (
-            f"{first} and {' and '.join(rest)} are known together, not apart: {self.mass:.1f} ± {SIGMAS * self.sd:.1f} "
-            f"kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a joint belongs to "
-            f"either side of it; where tables cut differs)."
+            f"{', '.join([first, *others])} and {last} are known together, not apart: {self.mass:.1f} ± "
+            f"{SIGMAS * self.sd:.1f} kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a "
+            f"joint belongs to either side of it; where tables cut differs)."
         )
 
 

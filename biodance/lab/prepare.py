@@ -15,8 +15,8 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import BRIDGED, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import of_postures
-from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
-from biodance.settings import FORCE_DOWN, SHORTEST_CONTACT, FilterKind, FilterSettings, GapSettings, Settings
+from biodance.records import Array, Markers, Plate, Trial, Wrench, contacts, runs
+from biodance.settings import FORCE_DOWN, FilterKind, FilterSettings, GapSettings, Settings
 
 USUAL_CUTOFF = 10.0
 """Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
@@ -260,18 +260,12 @@ def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -
 
 
 def _loaded(wrench: Wrench) -> Array:
-    """Return (n, 2) s between which the vertical force exceeds `FORCE_DOWN`, linearly between two samples; NaN where
-    that began before the recording or went on after it.
+    """Return (n, 2) s of all `contacts`, the passing of `FORCE_DOWN` linearly between two samples; NaN where
+    one began before the recording or went on after it.
     """
     time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
-    down = force > FORCE_DOWN
-    # Gaps first, then contacts: a flicker joins the contact that it interrupts.
-    for value in (False, True):
-        for start, stop in runs(down == value):
-            if start > 0 and stop < down.size and time[stop] - time[start] < SHORTEST_CONTACT:
-                down[start:stop] = not value
-    ends = np.array(runs(down), dtype=int).reshape(-1, 2)
-    seen = (ends > 0) & (ends < down.size)
+    ends = np.array(runs(contacts(wrench)), dtype=int).reshape(-1, 2)
+    seen = (ends > 0) & (ends < time.size)
     at = ends[seen]
     share = np.clip((FORCE_DOWN - force[at - 1]) / (force[at] - force[at - 1]), 0, 1)
     found = np.full(ends.shape, np.nan)

@@ -356,7 +356,7 @@ class Followed:
             marker_names=found.marker_names,
             determined=determined,
             state=state,
-            notes=(*_notes(self.body, found), *warning),
+            notes=(*_notes(self.body, found, self.markers.time), *warning),
         )
 
 
@@ -384,13 +384,13 @@ def hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
     )
 
 
-def _notes(body: Body, found: InverseKinematics) -> tuple[str, ...]:
+def _notes(body: Body, found: InverseKinematics, time: Array) -> tuple[str, ...]:
     frames, names = len(found.q), found.marker_names
     rms = np.sqrt(np.nanmean(found.residual**2))
     frame, marker = np.unravel_index(np.nanargmax(found.residual), found.residual.shape)
     notes = [
         f"Inverse kinematics: {frames} frames, {len(names)} markers, RMS distance {1e3 * rms:.1f} mm, "
-        f"largest {1e3 * found.residual[frame, marker]:.1f} mm ({names[marker]}, frame {frame})."
+        f"largest {1e3 * found.residual[frame, marker]:.1f} mm ({names[marker]} at {time[frame]:.2f} s)."
     ]
     absent = [name for name in body.markers.names if name not in names]
     if absent:
@@ -401,7 +401,9 @@ def _notes(body: Body, found: InverseKinematics) -> tuple[str, ...]:
     ):
         count = int((found.status == status).sum())
         if count:
-            notes.append(f"{count} of {frames} frames {text} (first: frame {int((found.status == status).argmax())}).")
+            notes.append(
+                f"{count} of {frames} frames {text} (first: at {time[(found.status == status).argmax()]:.2f} s)."
+            )
     return tuple(notes)
 
 

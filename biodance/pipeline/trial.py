@@ -179,7 +179,7 @@ def forces_told(forces: Sequence[ForceGain]) -> tuple[str, ...]:
     for name, axes in (("horizontal", slice(0, 2)), ("vertical", slice(2, 3))):
         before, after = (float(np.sqrt(np.mean(np.sum(x[:, axes] ** 2, axis=1)))) for x in (without, with_them))
         change = 100 * (after / before - 1)
-        word = "does not change" if abs(change) < 1 else f"{'falls' if change < 0 else 'grows'} by {abs(change):.0f} %"
+        word = "hardly changes" if abs(change) < 1 else f"{'falls' if change < 0 else 'grows'} by {abs(change):.0f} %"
         told.append(f"that of the {name} force {word} ({before:.1f} to {after:.1f} N)")
     return (
         f"Measured and simulated forces chose none of these joints; their RMS difference with them: {', '.join(told)}.",

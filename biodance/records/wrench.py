@@ -15,6 +15,7 @@ from biodance.records.arrays import (
     CHANNEL_TITLES,
     CHANNELS,
     Array,
+    Mask,
     Sampled,
     any_coordinate,
     assign,
@@ -22,9 +23,10 @@ from biodance.records.arrays import (
     freeze,
     frozen_array,
     in_time,
+    runs,
     span,
 )
-from biodance.settings import COP_FORCE
+from biodance.settings import COP_FORCE, FORCE_DOWN, SHORTEST_CONTACT
 from biodance.spatial import zero_moment_point
 
 if TYPE_CHECKING:
@@ -355,6 +357,27 @@ class Wrench(Sampled):
         return display.curves(self.time, self.moment, CHANNELS[3:], "moment (N·m)", axes=axes)
 
 
+_REACHED = 0.1
+"""Share of the largest force that a contact reaches: while a runner flies, the belt shakes, and a low-passed force
+swings, beyond `FORCE_DOWN`, too, and toes that scrape a plate press as much."""
+
+
+def contacts(wrench: Wrench) -> Mask:
+    """Return (T,) where something stands on what a ``wrench`` was measured by: its vertical force exceeds `FORCE_DOWN`
+    and reaches `_REACHED` of the largest before it ends. A flicker joins the contact that it interrupts.
+    """
+    time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
+    found = np.asarray(force > FORCE_DOWN)
+    for start, stop in runs(found):
+        found[start:stop] = force[start:stop].max() > _REACHED * force.max()
+    # Gaps first, then contacts.
+    for value in (False, True):
+        for start, stop in runs(found == value):
+            if start > 0 and stop < found.size and time[stop] - time[start] < SHORTEST_CONTACT:
+                found[start:stop] = not value
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Plate:
     """One force plate of one trial.
@@ -383,7 +406,7 @@ class Plate:
         (2,) m where the point of its moments was put by the feet that stand on it; None where the file or the analyst
         says the place.
     loaded : array_like
-        (n, 2) s from when until when the vertical force as recorded exceeded `settings.FORCE_DOWN` (NaN: before or
+        (n, 2) s from when until when the vertical force as recorded shows `contacts` (NaN: before or
         after the recording), once prepared: a low-pass smears the sudden beginning of a step to up to 34 ms before it.
 
     Examples

@@ -47,7 +47,7 @@ def standing(static: Trial) -> StaticPosture:
         There are no markers, no recognised marker set, or a landmark that the body needs is missing in every frame; all
         are named.
     """
-    where = f"Static trial {static.name}"
+    where = f"{'Static trial' if static.role == 'static' else 'Trial'} {static.name}"
     if static.markers is None:
         raise TrialRefused(
             f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still."
@@ -80,7 +80,8 @@ def standing(static: Trial) -> StaticPosture:
     points |= corners
     _refuse_missing(landmarks, marker_set, where)
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
-    notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]
+    at = f"frames {first} to {last}, the quietest {WINDOW} s" if last > first else f"its only frame, {first}"
+    notes = [f"{where}: posture from {at}."]
     if not still:
         notes = [Doubt(f"{where}: nobody stands still in it; its frame {first} was taken for the posture", mended=True)]
     notes += [f"{where}: {', '.join(elsewhere)} not seen then, taken from the rest of the trial."] if elsewhere else []

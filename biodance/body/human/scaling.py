@@ -223,7 +223,7 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     centres = static_centres(
         posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"], flat=posture.still
     )
-    scaled = f"Scaled on static trial {static.name}; hip centres: {hip.capitalize()}."
+    scaled = f"Scaled on {'static ' * (static.role == 'static')}trial {static.name}; hip centres: {hip.capitalize()}."
     notes = (scaled, *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
 

@@ -199,7 +199,9 @@ class PlateCorrection:
 
     def __str__(self) -> str:
         name = f"{self.effect} {self.target}".replace("_", " ").strip()
-        return f"{name} ({self.fault.parameter} {self.value:.4g} {self.fault.unit})".replace(" 1)", ")")
+        # a channel of forces or of moments has one of two units
+        unit = self.fault.unit.split(" or ")[-1 if self.target.rpartition(":")[2].startswith("M") else 0]
+        return f"{name} ({self.fault.parameter} {self.value:.3g} {unit})".replace(" 1)", ")")
 
     @property
     def fault(self) -> PlateFault:

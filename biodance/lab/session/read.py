@@ -20,6 +20,7 @@ from biodance.lab.session.entries import with_parts_corrected
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
 from biodance.lab.session.subject import identify_subject
 from biodance.records import Role, Session, Trial
+from biodance.records.attention import Doubt
 from biodance.settings import Settings
 from biodance.threads import one_thread
 
@@ -203,10 +204,8 @@ def _settle_static(
     """Return the trials, one of them static where nobody told which; note a static that moves, or none."""
     for trial in trials:
         if trial.role == "static" and trial.markers is not None and not is_still(trial):
-            notes.append(
-                f"{trial.name} is the static trial, but its markers travel {movement(trial.markers):.2f} m. Is it the "
-                f"right file?"
-            )
+            travels = f"{trial.name} is the static trial, but its markers travel {movement(trial.markers):.2f} m"
+            notes.append(Doubt(travels, "Is it the right file? Set its role in session.toml."))
     if any(trial.role == "static" for trial in trials):
         return trials
     # of the still ones that with the most markers; a single frame, which some laboratories keep, counts as still

@@ -273,6 +273,9 @@ def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
     """Return "M" from 1.70 m on and "F" below, which is right for most adults, and say so."""
     sex: Literal["F", "M"] = "M" if stature >= 1.70 else "F"
     known = f"a stature of {stature:.2f} m is more frequent among"
-    basis, people = known if math.isfinite(stature) else "without a stature taken as", "men" if sex == "M" else "women"
+    basis, people = (
+        known if math.isfinite(stature) else "without a stature people are taken for",
+        "men" if sex == "M" else "women",
+    )
     notes.append(f"The sex is not given: {basis} {people}, so tables for {sex} are used. Set sex in session.toml.")
     return sex

@@ -34,8 +34,8 @@ CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from
 _UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat", "jump": "take-off"}
 _COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises", "jump": "jumps"}
 _BECAUSE = {
-    LeftOutBecause.SHARED_PLATE: "in {n} both feet were on one plate for a part, which has no loads",
-    LeftOutBecause.SPIKE: "{n} with a spike left out",
+    LeftOutBecause.SHARED_PLATE: "in {n} both feet may have been on one plate for a part, which has no loads",
+    LeftOutBecause.SPIKE: "{n} curves with a spike left out",
     LeftOutBecause.TURN: "{n} left out because the person turned",
 }
 _DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1, "%/s": 0}
@@ -195,5 +195,7 @@ def _score(name: str, found: Mapping[str, Spread]) -> Row:
 
 
 def _beside(late: float) -> str:
-    """Return how much later than the file's ours are: ``6 ms earlier``."""
+    """Return how much later than the file's ours are: ``6 ms earlier``, ``at the same time``."""
+    if abs(late) < 0.0005:
+        return "at the same time"
     return f"{millimetres(abs(late), 0)} ms {'later' if late > 0 else 'earlier'}"
