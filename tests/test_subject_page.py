@@ -155,7 +155,7 @@ def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(resul
 @pytest.mark.parametrize(
     ("right", "left", "count", "said"),
     [
-        (60.0, 59.9, 4, "Your two knees bend equally far, as well as we can tell."),
+        (60.0, 59.9, 4, "We see no sure difference in how far your two knees bend."),
         (50.0, 60.0, 4, "Your left knee bends 10 degrees more"),
         (60.0, 50.0, 2, "too few of them to say"),
     ],
@@ -166,7 +166,7 @@ def test_a_difference_of_the_knees_is_told_where_it_is_sure(right, left, count, 
 
 def test_a_session_without_identification_says_so(result):
     html = subject_page(account_for(replace(result, identification=None)))
-    assert "no test in which you moved" in html
+    assert "No test of yours shows" in html
     assert " kg" not in html
 
 

@@ -129,8 +129,8 @@ class Together:
         first, *others, last = (spaced(name) for name in self.segments)
         return (
             f"{', '.join([first, *others])} and {last} are known together, not apart: {self.mass:.1f} ± "
-            f"{SIGMAS * self.sd:.1f} kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a "
-            f"joint belongs to either side of it; where tables cut differs)."
+            f"{SIGMAS * self.sd:.1f} kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at "
+            f"a joint belongs to either side of it; where tables cut differs)."
         )
 
 

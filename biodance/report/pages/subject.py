@@ -92,7 +92,7 @@ def _knees(knee: KeySummary, words: Language) -> str:
     if knee.ci95 is None:
         return words.say("There were too few of them to say if your two knees bend equally far.")
     if knee.ci95[0] <= 0 <= knee.ci95[1]:
-        return words.say("Your two knees bend equally far, as well as we can tell.")
+        return words.say("We see no sure difference in how far your two knees bend.")
     size = abs(knee.difference)
     if size < 0.5:
         return words.say("Your two knees bend equally far, to less than one degree.")
@@ -199,15 +199,15 @@ PLAIN_NAMES = {
 }
 _WHY = {
     movement.WHY_STOPPED: N_("The work was stopped before its end."),
-    movement.WHY_NOTHING: N_("We have no test in which you moved while both feet were on our plates."),
+    movement.WHY_NOTHING: N_("No test of yours shows well enough what each part of your body weighs."),
     movement.WHY_IMPOSSIBLE: N_("The numbers did not fit any real body. So something went wrong in the test."),
     movement.WHY_DOUBTED: N_("The small balls on your skin did not show clearly where your joints are."),
-    movement.WHY_FAULTY: N_("The plates and the cameras did not agree. We must first find out why."),
+    movement.WHY_FAULTY: N_("We could not be sure that everything in the recording was right."),
     "mass on the plates": N_("The weight on our plates differed from the weight that we wrote down."),
     "centre of mass off": N_("The plates and the cameras did not agree on where you stood."),
     "marker distance": N_("The small balls on your skin did not fit our model of your body."),
     "markers not seen": N_("The cameras lost sight of some of the small balls on your skin for too long."),
-    "fully measured": N_("You had both feet on our plates for too short a time."),
+    "fully measured": N_("Your feet were on our plates for too short a time."),
     "force difference": N_("The force on the plates did not fit the way you moved."),
 }
 """Reason for withholding, by its beginning -> a sentence for the subject."""
