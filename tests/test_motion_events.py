@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.cycles.cut import foot_events
+from biodance.cycles.cut import foot_events, on_one_plate, that_may_touch
 from biodance.motion.contact import Contact
-from biodance.records import Plate, Wrench
+from biodance.records import FootEvent, Plate, Wrench, contacts
 
 TIME = np.arange(200) / 100
 
@@ -22,7 +22,7 @@ def walked(*, measured=True, shared=False):
     on[:, 1, 0] = shared
     sure = np.full(200, measured)
     contact = Contact(TIME, on.any(axis=2), on, sure, np.zeros((200, 2)), (), np.stack([sure, sure], axis=1))
-    plates = [Plate(name, 2, np.zeros((4, 3)), Wrench(TIME, 0 * value)) for name in ("plate1", "plate2")]
+    plates = [Plate(f"plate{k + 1}", 2, np.zeros((4, 3)), Wrench(TIME, (1 - k) * value)) for k in range(2)]
     return {"right_foot": Wrench(TIME, value), "left_foot": Wrench(TIME, np.zeros((200, 6)))}, contact, plates
 
 
@@ -46,6 +46,34 @@ def test_a_flicker_is_no_event():
         pytest.approx(0.392),
         pytest.approx(1.208),
     ]
+
+
+def test_a_force_that_swings_in_flight_and_toes_that_scrape_are_no_contact():
+    """As a low-passed force does between two steps of a runner; 48 of 744 N is a toe that brushes a plate."""
+    feet, contact, plates = walked()
+    value = np.array(feet["right_foot"].value)
+    value[130:140, 2] = 60.0
+    swung = Wrench(TIME, value)
+    assert np.flatnonzero(contacts(swung))[[0, -1]].tolist() == [40, 120]
+    assert foot_events(feet | {"right_foot": swung}, contact, plates) == foot_events(feet, contact, plates)
+    assert contacts(Wrench(TIME, 10 * value))[130:140].sum() == 0  # whoever is heavier, too
+    value[130:140, 2] = 200.0  # a foot that bears little
+    assert contacts(Wrench(TIME, value))[130:140].all()
+
+
+def test_feet_share_a_plate_only_while_it_carries_something():
+    """The feet of a runner are both low while neither touches."""
+    _, contact, plates = walked(shared=True)
+    everywhere = replace(contact, on_plate=np.ones((200, 2, 2), dtype=bool))
+    assert (on_one_plate(everywhere, plates) == contacts(plates[0].wrench)).all()
+    assert not on_one_plate(contact, [replace(plates[0], wrench=Wrench(TIME, np.zeros((200, 6)))), plates[1]]).any()
+
+
+def test_a_leg_that_swings_in_the_air_strikes_nothing():
+    contact = walked()[1]  # the right foot touches from 0.40 s on
+    strikes = [FootEvent(time, "right", True, "markers") for time in (0.2, 0.35, 0.5)]
+    off = FootEvent(0.1, "left", False, "markers")
+    assert that_may_touch([off, *strikes], contact) == (off, *strikes[1:])
 
 
 def test_where_the_recorded_force_passes_the_threshold_it_tells_when():

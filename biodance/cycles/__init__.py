@@ -6,7 +6,7 @@ program wrote into the same file.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -354,6 +354,8 @@ def trial_movement(
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
     feet = foot_wrenches(trial, contact, soles) if contact is not None else None
+    mild = tuple(replace(one, wrench=one.peaks or one.wrench) for one in trial.plates)
+    with_peaks = foot_wrenches(replace(trial, plates=mild), contact, soles) if contact is not None else {}
     force = cut.foot_events(feet, contact, trial.plates) if contact is not None and feet is not None else ()
     markers = cut.kinematic_events(body, motion)
     markers = cut.that_may_touch(markers, contact) if contact is not None else markers
@@ -379,7 +381,7 @@ def trial_movement(
             # in gait the force under a foot does not count while both are on one plate
             known = known_of_feet & ~shared[:, None] if cycle.kind == "gait" else known_of_feet
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
-            curves += ground_curves(cycle, body, motion, soles, feet, known)
+            curves += ground_curves(cycle, body, motion, soles, with_peaks, known)
     return TrialMovement(
         trial.name,
         events,

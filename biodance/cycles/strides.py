@@ -37,6 +37,10 @@ STRIDE_UNITS: Mapping[str, str] = {
 """Spatio-temporal quantity -> unit."""
 
 
+_RESTS = 0.1
+"""s after its strike in which a heel comes to rest: it slides up to 6 cm until then, by when the strike is told."""
+
+
 @dataclass(frozen=True)
 class Stride:
     """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that is not known is missing."""
@@ -50,10 +54,10 @@ def strides(
 ) -> tuple[Stride, ...]:
     """Return the values of all gait cycles; ``centre`` (T, 3) m of mass at the times of the soles.
 
-    Lengths are horizontal: a stride from a heel's place at one strike to its next, relative to the ground, which on a
-    treadmill is as fast as the foot that stands on it. A step goes from the other foot's strike to this foot's, its
-    length along the stride, its width across it, negative where the feet cross. Margins: `_margins`. Flight, from
-    leaving the ground to the other foot's strike, and stiffness (`vertical_stiffness`) are of running.
+    Lengths are horizontal: a stride from where a heel comes to rest (`_RESTS`) to its next such place, relative to the
+    ground, which on a treadmill is as fast as the foot that stands on it. A step goes from the other foot's place to
+    this foot's, its length along the stride, its width across it, negative where the feet cross. Margins: `_margins`.
+    Flight, from leaving the ground to the other foot's strike, and stiffness (`vertical_stiffness`) are of running.
     """
     heel, mass, found = heel_and_toe(body, soles.outline)[0][..., :2], float(body.sip.mass.sum()), []
     velocity = np.gradient(centre[:, :2], soles.time, axis=0)
@@ -65,8 +69,10 @@ def strides(
         # 0.15 m/s of a standing foot from which the ground is a belt
         ground = ground if np.linalg.norm(ground) > 0.15 else np.zeros(2)  # m/s of what the foot stands on
         # Way of the heel relative to the ground.
-        stride = place_at(own, soles.time, one.end) - place_at(own, soles.time, one.start) - ground * one.duration
-        values = _values(one, other_off, other_strike, heel, soles.time, ground, stride)
+        rests = min(_RESTS, soles.time[-1] - one.end)
+        start, end = (place_at(own, soles.time, when + rests) for when in (one.start, one.end))
+        stride = end - start - ground * one.duration
+        values = _values(one, other_off, other_strike, heel, soles.time - rests, ground, stride)
         values |= _margins(one, other_off, other_strike, own, soles, centre, velocity - ground, stride)
         contact, flight = one.off - one.start, other_strike - one.off
         if flight > 0:

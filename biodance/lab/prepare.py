@@ -15,8 +15,8 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import BRIDGED, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import of_postures
-from biodance.records import Array, Markers, Plate, Trial, Wrench, contacts, runs
-from biodance.settings import FORCE_DOWN, FilterKind, FilterSettings, GapSettings, Settings
+from biodance.records import Array, Markers, Plate, Trial, Wrench, contact_times, runs
+from biodance.settings import FilterKind, FilterSettings, GapSettings, Settings
 
 USUAL_CUTOFF = 10.0
 """Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
@@ -176,7 +176,10 @@ def prepare(trial: Trial) -> Trial:
             history += said
             markers, said, warned = _fill(markers, trial.marker_set, trial.settings.gaps)
             history, warnings = history + said, warned
-        plates = tuple(at_marker_times(plate, markers, filtering) for plate in trial.plates)
+        plates = tuple(
+            replace(at_marker_times(plate, markers, filtering), peaks=_with_peaks(plate.wrench, markers))
+            for plate in trial.plates
+        )
     except TrialRefused:
         raise
     except BiodanceError as error:
@@ -243,7 +246,7 @@ def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers,
 def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
-    plate = replace(plate, loaded=_loaded(wrench))
+    plate = replace(plate, loaded=contact_times(wrench))
     if of_postures(wrench.time):
         how = "not filtered, every row is a posture"
     elif wrench.time.size < 2 or wrench.time.size < filtering.shortest(wrench.rate):
@@ -259,18 +262,15 @@ def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -
     return replace(plate, wrench=Wrench(markers.time, value), decisions=(*plate.decisions, f"{how}; {sampled}."))
 
 
-def _loaded(wrench: Wrench) -> Array:
-    """Return (n, 2) s of all `contacts`, the passing of `FORCE_DOWN` linearly between two samples; NaN where
-    one began before the recording or went on after it.
-    """
-    time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
-    ends = np.array(runs(contacts(wrench)), dtype=int).reshape(-1, 2)
-    seen = (ends > 0) & (ends < time.size)
-    at = ends[seen]
-    share = np.clip((FORCE_DOWN - force[at - 1]) / (force[at] - force[at - 1]), 0, 1)
-    found = np.full(ends.shape, np.nan)
-    found[seen] = time[at - 1] + share * (time[at] - time[at - 1])
-    return found
+def _with_peaks(wrench: Wrench, markers: Markers | None) -> Wrench | None:
+    """Return the wrench at marker times, low-passed as little as their rate allows; None where they have no rate."""
+    if markers is None or markers.time.size < 2 or of_postures(markers.time) or of_postures(wrench.time):
+        return None
+    # 0.4 of the rate: a little below its half, beyond which frequencies fold
+    mild = LowPass(cutoff=0.4 * min(markers.rate, wrench.rate))
+    if wrench.time.size >= mild.shortest(wrench.rate):
+        wrench = Wrench(wrench.time, low_pass(wrench.value, wrench.rate, mild))
+    return Wrench(markers.time, _sample(wrench, markers.time)[0])
 
 
 def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:

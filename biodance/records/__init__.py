@@ -40,4 +40,5 @@ from biodance.records.wrench import Markers as Markers
 from biodance.records.wrench import Plate as Plate
 from biodance.records.wrench import Source as Source
 from biodance.records.wrench import Wrench as Wrench
+from biodance.records.wrench import contact_times as contact_times
 from biodance.records.wrench import contacts as contacts

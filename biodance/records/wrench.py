@@ -378,6 +378,20 @@ def contacts(wrench: Wrench) -> Mask:
     return found
 
 
+def contact_times(wrench: Wrench) -> Array:
+    """Return (n, 2) s from when until when each of its `contacts` lasts, the passing of `FORCE_DOWN` linearly between two
+    samples; NaN where one began before the recording or went on after it.
+    """
+    time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
+    ends = np.array(runs(contacts(wrench)), dtype=int).reshape(-1, 2)
+    seen = (ends > 0) & (ends < time.size)
+    at = ends[seen]
+    share = np.clip((FORCE_DOWN - force[at - 1]) / (force[at] - force[at - 1]), 0, 1)
+    found = np.full(ends.shape, np.nan)
+    found[seen] = time[at - 1] + share * (time[at] - time[at - 1])
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Plate:
     """One force plate of one trial.
@@ -408,6 +422,9 @@ class Plate:
     loaded : array_like
         (n, 2) s from when until when the vertical force as recorded shows `contacts` (NaN: before or
         after the recording), once prepared: a low-pass smears the sudden beginning of a step to up to 34 ms before it.
+    peaks : Wrench or None
+        The wrench at the times of ``wrench``, low-passed as little as their rate allows, once prepared: what is slow
+        enough for joint moments has lost some per cent of the peaks.
 
     Examples
     --------
@@ -426,6 +443,7 @@ class Plate:
     columns: str = ""
     put: Array | None = None
     loaded: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    peaks: Wrench | None = None
 
     def __post_init__(self) -> None:
         put = None if self.put is None else frozen_array(self.put, (2,), f"{self.name}.put")
