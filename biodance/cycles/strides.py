@@ -38,7 +38,7 @@ STRIDE_UNITS: Mapping[str, str] = {
 
 
 _RESTS = 0.1
-"""s after its strike in which a heel comes to rest: it slides up to 6 cm until then, by when the strike is told."""
+"""s after its strike in which a heel comes to rest: until then it slides by up to 6 cm, by what told the strike."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def strides(
         rests = min(_RESTS, soles.time[-1] - one.end)
         start, end = (place_at(own, soles.time, when + rests) for when in (one.start, one.end))
         stride = end - start - ground * one.duration
-        values = _values(one, other_off, other_strike, heel, soles.time - rests, ground, stride)
+        values = _values(one, other_off, other_strike, heel, soles.time, ground, stride, rests)
         values |= _margins(one, other_off, other_strike, own, soles, centre, velocity - ground, stride)
         contact, flight = one.off - one.start, other_strike - one.off
         if flight > 0:
@@ -153,7 +153,14 @@ def _other_foot(cycle: Cycle, events: Sequence[FootEvent]) -> tuple[float, float
 
 
 def _values(
-    cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array, ground: Array, stride: Array
+    cycle: Cycle,
+    other_off: float,
+    other_strike: float,
+    heel: Array,
+    time: Array,
+    ground: Array,
+    stride: Array,
+    rests: float,
 ) -> dict[str, float]:
     foot, length = SIDES.index(cycle.side), float(np.linalg.norm(stride))
     values = {
@@ -166,13 +173,17 @@ def _values(
     if np.isfinite(cycle.off):
         values["stance"] = cycle.off_percent
     if np.isfinite(other_strike) and length > 0:
-        across = place_at(heel[:, foot], time, cycle.end) - place_at(heel[:, 1 - foot], time, other_strike)
-        # The ground has moved on since the other foot's strike.
-        across -= ground * (cycle.end - other_strike)
+        # From the other foot's place to this one's, at their strikes and at rest; the ground has moved on between them.
+        across, between = (
+            place_at(heel[:, foot], time, cycle.end + later)
+            - place_at(heel[:, 1 - foot], time, other_strike + later)
+            - ground * (cycle.end - other_strike)
+            for later in (0.0, rests)
+        )
         along = stride / length
         values["step_time"] = cycle.end - other_strike
-        values["step_length"] = float(across @ along)
-        # Cross product with the direction of the stride.
+        values["step_length"] = float(between @ along)
+        # Cross product with the direction of the stride; soles that roll outwards after the strike widen no step.
         to_right = float(across[0] * along[1] - across[1] * along[0])
         values["step_width"] = to_right if cycle.side == "right" else -to_right
     # Both feet stand from this strike to the other's leaving, and from the other's strike to this leaving.

@@ -379,8 +379,8 @@ def contacts(wrench: Wrench) -> Mask:
 
 
 def contact_times(wrench: Wrench) -> Array:
-    """Return (n, 2) s from when until when each of its `contacts` lasts, the passing of `FORCE_DOWN` linearly between two
-    samples; NaN where one began before the recording or went on after it.
+    """Return (n, 2) s from when until when each of the `contacts` lasts, the passing of `FORCE_DOWN` linearly between
+    two samples; NaN where one began before the recording or went on after it.
     """
     time, force = wrench.time, np.nan_to_num(wrench.force[:, 2])
     ends = np.array(runs(contacts(wrench)), dtype=int).reshape(-1, 2)
