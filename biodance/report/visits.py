@@ -66,8 +66,8 @@ def comparison_sentence(found: VisitComparison) -> str:
     if not found.tested:
         return "Nothing can be told to have changed: no quantity has an interval in the first and the last visit."
     if not found.changed:
-        few = f" {untested} of {len(found.quantities)} quantities could not be tested." if untested else ""
-        return f"Nothing changed beyond its uncertainty.{few}"
+        few = f"None of the {found.tested} quantities that could be tested ({len(found.quantities)} in all)"
+        return f"{few if untested else 'Nothing'} changed beyond its uncertainty."
     one, count = found.changed[0], len(found.changed)
     assert one.change_ci95 is not None
     return (

@@ -341,9 +341,11 @@ def pressure_figure(found: Repetitions) -> str:
         own = {one.quantity: one for one in found.groups if one.side == side}
         if "pressure_ahead" in own:
             ends = (own[name] for name in ("pressure_outward", "pressure_ahead"))
-            # the mean where at least half of the cycles are known: elsewhere it is of another few
-            known = [np.where(2 * np.isfinite(e.values).sum(axis=0) >= len(e.values), e.mean, np.nan) for e in ends]
-            ways[side] = 1000 * np.stack(known, axis=1)
+            # the mean where at least half of the cycles that are measured at all are known: else it is of another few
+            told = [(e.mean, np.isfinite(e.values)) for e in ends]
+            known = [np.where(2 * n.sum(axis=0) >= n.any(axis=1).sum(), mean, np.nan) for mean, n in told]
+            if np.isfinite(known).any():
+                ways[side] = 1000 * np.stack(known, axis=1)
     if not ways:
         return ""
     every = np.concatenate(list(ways.values()))

@@ -35,7 +35,7 @@ _UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat
 _COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises", "jump": "jumps"}
 _BECAUSE = {
     LeftOutBecause.SHARED_PLATE: "in {n} both feet may have been on one plate for a part, which has no loads",
-    LeftOutBecause.SPIKE: "{n} curves with a spike left out",
+    LeftOutBecause.SPIKE: "{n} curve{s} with a spike left out",
     LeftOutBecause.TURN: "{n} left out because the person turned",
 }
 _DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1, "%/s": 0}
@@ -137,7 +137,8 @@ def _flags(found: Repetitions) -> list[str]:
             everywhere = len(names) > 2 and names.keys() == {one.trial for one in found.cycles}
             trials = "all trials" if everywhere else ", ".join(names)
             what = ", ".join(dict.fromkeys(spaced(one.quantity) for one in some if because is LeftOutBecause.SPIKE))
-            told.append(f"{said.format(n=len(some))}{f' ({what})' if what else ''}: {trials}")
+            counted = said.format(n=len(some), s="s" * (len(some) != 1))
+            told.append(f"{counted}{f' ({what})' if what else ''}: {trials}")
     if found.speeds:
         slow, fast = (format_number(one, 1) for one in found.speeds)
         told.append(f"the trials differ in speed ({slow} to {fast} m/s), so that one mean of them is of neither")
