@@ -77,6 +77,16 @@ def test_trials_of_different_speeds_are_told() -> None:
     assert repetitions_of("gait", walked[:1]).speeds is None
 
 
+def test_only_strides_with_a_flight_are_running() -> None:
+    """A jump has a flight, too."""
+    flies = trial("drop", [curve(cycle(0), 1.0)])
+    flies = replace(flies, strides=tuple(Stride(one, {"flight_time": 0.1}) for one in flies.cycles))
+    assert repetitions_of("gait", [flies]).runs
+    jump = replace(flies.cycles[0], kind="jump", side="both")
+    jumped = replace(flies, cycles=(jump,), curves=(), strides=(), lifts=(Stride(jump, {"flight_time": 0.4}),))
+    assert not repetitions_of("jump", [jumped]).runs
+
+
 def test_a_shared_plate_is_flagged() -> None:
     found = repetitions_of("gait", [trial("walk", [curve(cycle(0), SHAPE)], shared=(cycle(0),))])
     (out,) = found.left_out

@@ -157,5 +157,9 @@ def test_a_plate_says_when_it_was_loaded_though_the_low_pass_smears_it() -> None
     (ready,) = prepare(replace(given, plates=(replace(plate, wrench=Wrench(time, value)),))).plates
     steps = [[0.7004, 1.3 - 0.1 * 20 / 700], [1.6004, np.nan]]
     np.testing.assert_allclose(ready.loaded, steps, atol=1e-4)
+    # what the low-pass takes from the first peak of 250 N, and swings beyond it, stays in the peaks
+    near = (ready.wrench.time > 0.705) & (ready.wrench.time < 0.75)
+    true = np.interp(ready.wrench.time, time, force)[near]
+    assert np.abs(ready.peaks.force[near, 2] - true).max() < 0.1 * np.abs(ready.wrench.force[near, 2] - true).max()
     smeared = ready.wrench.force[:, 2] > 20
     assert ready.wrench.time[smeared][0] < 0.695

@@ -20,6 +20,7 @@ from biodance.lab.readers import read_trial
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import role_by_name
 from biodance.lab.session.results_folder import results_folder
+from biodance.records.attention import Doubt
 
 
 @pytest.fixture
@@ -81,7 +82,9 @@ def test_session_without_a_static_says_so(tmp_path):
 
 def test_static_that_walks_is_said(tmp_path):
     write_trial(tmp_path, "static", speed=1.2)
-    assert "its markers travel" in said(read_session(tmp_path))
+    (doubt,) = (note for note in read_session(tmp_path).notes if isinstance(note, Doubt))
+    assert "its markers travel" in doubt
+    assert doubt.level == "warn", "the body, the joints and what is judged as standing rest on it"
 
 
 def test_eclipse_tells_role_and_invalid_plate(folder):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.cycles.cut import foot_events, on_one_plate, that_may_touch
+from biodance.cycles.cut import foot_events, that_may_touch, under_both_feet
 from biodance.motion.contact import Contact
 from biodance.records import FootEvent, Plate, Wrench, contacts
 
@@ -65,15 +65,15 @@ def test_feet_share_a_plate_only_while_it_carries_something():
     """The feet of a runner are both low while neither touches."""
     _, contact, plates = walked(shared=True)
     everywhere = replace(contact, on_plate=np.ones((200, 2, 2), dtype=bool))
-    assert (on_one_plate(everywhere, plates) == contacts(plates[0].wrench)).all()
-    assert not on_one_plate(contact, [replace(plates[0], wrench=Wrench(TIME, np.zeros((200, 6)))), plates[1]]).any()
+    assert (under_both_feet(everywhere, plates) == contacts(plates[0].wrench)).all()
+    assert not under_both_feet(contact, [replace(plates[0], wrench=Wrench(TIME, np.zeros((200, 6)))), plates[1]]).any()
 
 
 def test_a_leg_that_swings_in_the_air_strikes_nothing():
     contact = walked()[1]  # the right foot touches from 0.40 s on
     strikes = [FootEvent(time, "right", True, "markers") for time in (0.2, 0.35, 0.5)]
     off = FootEvent(0.1, "left", False, "markers")
-    assert that_may_touch([off, *strikes], contact) == (off, *strikes[1:])
+    assert that_may_touch((off, *strikes), contact) == (off, *strikes[1:])
 
 
 def test_where_the_recorded_force_passes_the_threshold_it_tells_when():

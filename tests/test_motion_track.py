@@ -73,7 +73,7 @@ def test_absent_markers_and_leaning_frames_are_named(markers):
     motion = track(WOMAN, trial_of(some))
     assert "Markers of the body that the trial does not have: T10, LFHD." in motion.notes
     assert any(
-        note.startswith("5 of 120 frames lean on their neighbours") and "first: frame 50" in note
+        note.startswith("5 of 120 frames lean on their neighbours") and f"first: at {markers.time[50]:.2f} s" in note
         for note in motion.notes
     )
     assert np.array_equal(np.flatnonzero(~motion.determined), np.arange(45, 60)), "and half a period of 10 Hz"

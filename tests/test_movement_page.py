@@ -10,10 +10,12 @@ from made_cycles import curve, cycle, level_gait, trial
 
 from biodance.cycles.curves import CycleCurve, group_curves
 from biodance.cycles.scores import SCORE_ANGLES
+from biodance.cycles.summary import repetitions_of
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.learn import MeasuredWalk, healthy_reference, learn_laboratory
 from biodance.pipeline.movement import SessionMovement
-from biodance.report.pages.movement import movement_section
+from biodance.report.figures.session import pressure_figure
+from biodance.report.pages.movement import _beside, movement_section
 from biodance.report.tables.schema import plain_values
 from biodance.report.tables.session import gait_document
 
@@ -36,10 +38,25 @@ def walked(**more: object) -> SessionMovement:
     return SessionMovement("visit", tuple(trials), "table", 60.0, {}, **more)  # type: ignore[arg-type]
 
 
+def test_the_way_of_the_pressure_is_drawn_though_most_steps_are_beside_the_plates() -> None:
+    places = {"pressure_ahead": 0.2 * SHAPE, "pressure_outward": 0.01 * SHAPE}
+    curves = [
+        curve(cycle(k), value if k == 0 else np.nan, name, "m") for k in range(3) for name, value in places.items()
+    ]
+    drawn = pressure_figure(repetitions_of("gait", [trial("walk", curves)]))
+    assert "<path" in drawn
+    assert ">200<" in drawn
+    assert pressure_figure(repetitions_of("gait", [trial("walk", curves[2:])])) == ""
+
+
+def test_events_at_the_same_time_are_said_to_be() -> None:
+    assert [_beside(late) for late in (0.0002, 0.006, -0.006)] == ["at the same time", "6 ms later", "6 ms earlier"]
+
+
 def test_the_section_shows_all_cycles_of_all_trials_and_how_to_get_a_reference() -> None:
     text = movement_section(walked())
     assert "5 right, 5 left gait cycles of 2 trials" in text
-    assert "In 2 both feet were on one plate for a part, which has no loads: first, second." in text
+    assert "In 2 both feet may have been on one plate for a part, which has no loads: first, second." in text
     assert "biodance learn --healthy" in re.sub(r"\s+", " ", text)
     assert "No moments and powers" in text
     panel = next(one for one in text.split('<div class="cell">') if "hip adduction (deg)" in one)

@@ -153,10 +153,7 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
         "lab.toml",
         *(f"corrected/{name}" for name in ("t.c3d", "session.toml", "corrected.toml")),
     }
-    assert (
-        said["corrected/t.c3d"]
-        == "taken off: plate position plate1:x (shift 0.03 m); plate offset Fx (offset 5 N or N·m)"
-    )
+    assert said["corrected/t.c3d"] == "taken off: plate position plate1:x (shift 0.03 m); plate offset Fx (offset 5 N)"
     assert "rotation" not in (tmp_path / "corrected" / "corrected.toml").read_text()
     late = QualityCheck("clock of the forces", False, "In t the forces come 200 ms late.", "time_delay", trials=("t",))
     other = replace(wrong, name="u", source=replace(wrong.source, path=Path("u.c3d")))

@@ -33,8 +33,8 @@ from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import NO_OUTPUTS, FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass, poses
-from biodance.motion.soles import soles_from_body
-from biodance.records import SIDES, Array, FootEvent, Mask, Motion, Plate, Sip, Trial
+from biodance.motion.soles import Soles, soles_from_body
+from biodance.records import SIDES, Array, FootEvent, Mask, Motion, Plate, Sip, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -353,12 +353,9 @@ def trial_movement(
     if motion.time.size < 3:
         raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
     soles = soles_from_body(body, motion)
-    feet = foot_wrenches(trial, contact, soles) if contact is not None else None
-    mild = tuple(replace(one, wrench=one.peaks or one.wrench) for one in trial.plates)
-    with_peaks = foot_wrenches(replace(trial, plates=mild), contact, soles) if contact is not None else {}
+    feet, with_peaks = _on_feet(trial, contact, soles)
     force = cut.foot_events(feet, contact, trial.plates) if contact is not None and feet is not None else ()
-    markers = cut.kinematic_events(body, motion)
-    markers = cut.that_may_touch(markers, contact) if contact is not None else markers
+    markers = cut.that_may_touch(cut.kinematic_events(body, motion), contact)
     events = cut.replaced_events(cut.joined_events(force, markers) if markers else (), trial.events)
     centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
     known_of_feet, shared = _known_feet(contact, trial.plates, motion.time.size)
@@ -399,13 +396,23 @@ def trial_movement(
     )
 
 
+def _on_feet(trial: Trial, contact: Contact | None, soles: Soles) -> tuple[dict[str, Wrench] | None, dict[str, Wrench]]:
+    """Return the wrenches on both feet for joint moments, and with their peaks (`Plate.peaks`); None and none without
+    plates.
+    """
+    if contact is None:
+        return None, {}
+    mild = tuple(replace(one, wrench=one.peaks or one.wrench) for one in trial.plates)
+    return foot_wrenches(trial, contact, soles), foot_wrenches(replace(trial, plates=mild), contact, soles)
+
+
 def _known_feet(contact: Contact | None, plates: Sequence[Plate], frames: int) -> tuple[Mask, Mask]:
     """Return (T, 2) where the plates tell the force under each foot, nowhere without plates; and (T,) where both feet
     may be on one plate.
     """
     if contact is None:
         return np.zeros((frames, 2), dtype=bool), np.zeros(frames, dtype=bool)
-    return contact.told, cut.on_one_plate(contact, plates)
+    return contact.told, cut.under_both_feet(contact, plates)
 
 
 def _notes(cycles: Sequence[cut.Cycle], on_one: Sequence[cut.Cycle], contact: Contact | None) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
     to 34 ms early: where one of the ``plates`` under the foot passes it as recorded, too (`Plate.loaded`), that
     instant counts.
     """
-    events, shared = [], on_one_plate(contact, plates)
+    events, shared = [], under_both_feet(contact, plates)
     for foot, side in enumerate(SIDES):
         wrench = feet[f"{side}_foot"]
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
@@ -51,13 +51,14 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact, plates: Sequence[P
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def on_one_plate(contact: Contact, plates: Sequence[Plate]) -> Mask:
+def under_both_feet(contact: Contact, plates: Sequence[Plate]) -> Mask:
     """Return (T,) where both feet may be on one plate that carries something: between two steps of a runner it is
     empty.
     """
-    return np.asarray(
-        np.any([contact.on_plate[..., k].all(axis=1) & contacts(one.wrench) for k, one in enumerate(plates)], axis=0)
-    )
+    found = np.zeros(contact.time.size, dtype=bool)
+    for k, one in enumerate(plates):
+        found |= contact.on_plate[..., k].all(axis=1) & contacts(one.wrench)
+    return found
 
 
 def _recorded(time: float, plates: Sequence[Plate], down: bool) -> Array:
@@ -113,16 +114,16 @@ def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def that_may_touch(events: Iterable[FootEvent], contact: Contact) -> tuple[FootEvent, ...]:
+def that_may_touch(events: tuple[FootEvent, ...], contact: Contact | None) -> tuple[FootEvent, ...]:
     """Return the events without strikes of a foot that is in the air within `_TOGETHER` of them: who stands on one leg
-    swings the other.
+    swings the other; all of them where no plate tells of contact.
     """
 
-    def touches(one: FootEvent) -> bool:
+    def touches(one: FootEvent, contact: Contact) -> bool:
         near = np.abs(contact.time - one.time) < _TOGETHER
         return bool(contact.touching[near, SIDES.index(one.side)].any())
 
-    return tuple(one for one in events if not one.down or touches(one))
+    return tuple(one for one in events if contact is None or not one.down or touches(one, contact))
 
 
 def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
