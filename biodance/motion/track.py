@@ -389,7 +389,8 @@ def _notes(body: Body, found: InverseKinematics, time: Array) -> tuple[str, ...]
     rms = np.sqrt(np.nanmean(found.residual**2))
     frame, marker = np.unravel_index(np.nanargmax(found.residual), found.residual.shape)
     notes = [
-        f"Inverse kinematics: {frames} frames, {len(names)} markers, RMS distance {1e3 * rms:.1f} mm, "
+        f"Inverse kinematics: {frames} frame{'s' * (frames != 1)}, {len(names)} markers, "
+        f"RMS distance {1e3 * rms:.1f} mm, "
         f"largest {1e3 * found.residual[frame, marker]:.1f} mm ({names[marker]} at {time[frame]:.2f} s)."
     ]
     absent = [name for name in body.markers.names if name not in names]
