@@ -10,7 +10,8 @@ from typing import Any, cast
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, SessionRefused, refuse_unknown
-from biodance.lab.plain_text import read_bytes, read_cells
+from biodance.lab.cells import read_cells
+from biodance.lab.plain_text import read_bytes
 from biodance.lab.readers import read_head, read_trial, sniffed
 from biodance.library import read_toml
 from biodance.records import ROLES, Array, Markers, Role, Wrench

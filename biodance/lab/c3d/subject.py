@@ -186,13 +186,13 @@ def subjects_in(path: Path) -> tuple[str, ...]:
 
 
 def subjects_of(labels: Sequence[str], parameters: Parameters) -> tuple[str, ...]:
-    """Return the names of the subjects in a file: prefixes of its labels (`_people_of`), else SUBJECTS:NAMES."""
+    """Return the names of the subjects in a file: prefixes of its labels (`people_of`), else SUBJECTS:NAMES."""
     nameless = unlabelled(labels)
     prefixes = [split_label(label)[0] for i, label in enumerate(labels) if i not in nameless]
-    return _people_of(prefixes) if any(prefixes) else tuple(filter(None, texts(parameters, "SUBJECTS", "NAMES")))
+    return people_of(prefixes) if any(prefixes) else tuple(filter(None, texts(parameters, "SUBJECTS", "NAMES")))
 
 
-def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
+def people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
     """Return those of the prefixes, one for each marker, that name people; all where nobody carries many."""
     counts = Counter(prefixes)
     # A thing (a club, a wheel, a probe) has six markers at most, three on each of two rigid parts; fewer than seven
@@ -234,7 +234,7 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
 
 def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
     """Return the columns whose label belongs to the chosen subject."""
-    prefixes = _people_of(raw.split_labels[i][0] for i in columns)
+    prefixes = people_of(raw.split_labels[i][0] for i in columns)
     things = dict.fromkeys(prefix for i in columns if (prefix := raw.split_labels[i][0]) not in ("", *prefixes))
     of_people = [i for i in columns if raw.split_labels[i][0] not in things]
     if things:
