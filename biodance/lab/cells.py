@@ -70,9 +70,10 @@ def read_tables(content: bytes, path: Path, *, least: int = 4) -> tuple[Cells, .
         if title[1] in _OF_NEXUS
     ]
     if not found:
+        only = ", ".join(title[1] for title in titles)
         raise FileRefused(
-            f"{path}: is an export of Vicon Nexus with {', '.join(title[1] for title in titles)} only. Export Trajectories and Devices with "
-            f"them, or the C3D file."
+            f"{path}: is an export of Vicon Nexus with {only} only. Export Trajectories and Devices, too, or the C3D "
+            f"file."
         )
     return tuple(found)
 
@@ -184,6 +185,11 @@ def clean_label(cell: str) -> tuple[str, str]:
 
 def _of_text(text: str, path: Path, least: int, first: int = 0) -> Cells:
     """Return the table in ``text``, which begins behind ``first`` rows of its file."""
+    if re.match(r"(?:.*\n){4}ITEM\t", text):
+        raise FileRefused(
+            f"{path}: is an export of Visual3D, which does not say the rate of its rows. Give the C3D file that it was "
+            f"made from."
+        )
     header = header_of(text, least=least)
     if header is None:
         raise FileRefused(f"{path}: no row holds the labels of columns. Write them into the first row, as LASI_x.")

@@ -1,7 +1,7 @@
 """Tables of other programs: OpenSim's over time as text (.mot, .sto: forces of the plates, joint coordinates, anything
-with a time column), with the ground forces and their set-up files for its tools; and BIDS motion (BEP 029),
-https://bids-specification.readthedocs.io, version 1.10: one trial is a task of a subject; ``_motion.tsv`` (numbers
-without header), ``_channels.tsv`` (one row a column), ``_motion.json``, ``_events.tsv``.
+with a time column; Cortex's .forces are read as one), with the ground forces and their set-up files for its tools; and
+BIDS motion (BEP 029), https://bids-specification.readthedocs.io, version 1.10: one trial is a task of a subject;
+``_motion.tsv`` (numbers without header), ``_channels.tsv`` (one row a column), ``_motion.json``, ``_events.tsv``.
 """
 
 import json
@@ -57,7 +57,7 @@ class TimeTable:
 
 
 def read_mot(path: str | Path) -> TimeTable:
-    """Return the table of a .mot or .sto file. Time may have unequal steps; cells that hold ``nan`` stay NaN.
+    """Return the table of a .mot, .sto or .forces file. Time may have unequal steps; cells that hold ``nan`` stay NaN.
 
     Raises
     ------
@@ -72,6 +72,10 @@ def read_mot(path: str | Path) -> TimeTable:
     table = plain_table([row for _, row in body], len(labels))
     if table is None:
         table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
+    if "samplerate" in header:
+        # of samples from 1 on, with points in mm and moments in N mm
+        table = table * [1.0, *(1.0 if "_v" in label else 1e-3 for label in labels[1:])]
+        table[:, 0] = (table[:, 0] - 1) / parse_number(header["samplerate"], f"{path}: SampleRate")
     time = table[:, 0]
     if np.isnan(time).any() or np.any(np.diff(time) <= 0):
         at = int(np.argmax(np.isnan(time))) if np.isnan(time).any() else int(np.argmax(np.diff(time) <= 0)) + 1
@@ -123,6 +127,8 @@ def _parts(
     """
     text, commas = with_points(read_text(path))
     rows = text.splitlines()
+    if rows[0].strip() == "[Force Data]":
+        return _of_cortex(rows)
     start = next((i for i, row in enumerate(rows[:200]) if row.strip().lower() == "endheader"), None)
     if start is None:
         raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
@@ -140,6 +146,21 @@ def _parts(
     if vectors:
         history.append("Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z.")
     return header, _columns(labels, vectors), body[1:], vectors, tuple(history)
+
+
+def _of_cortex(
+    rows: list[str],
+) -> tuple[dict[str, str], tuple[str, ...], list[tuple[int, str]], tuple[str, ...], tuple[str, ...]]:
+    """Return the parts of a .forces file: FX FY FZ, the point of pressure X Y Z and the moment MZ about it, a plate."""
+    pairs = (row.split("=", 1) for row in rows[:20] if "=" in row)
+    header = {key.strip().lower(): value.strip() for key, value in pairs}
+    start = next((i for i, row in enumerate(rows[:20]) if row.startswith("#")), 0)
+    found = [re.fullmatch(r"([FM]?)([XYZ])(\d+)", cell) for cell in cells(rows[start])[1:] if cell]
+    parts = {"F": "ground_force_{}_v", "": "ground_force_{}_p", "M": "ground_torque_{}_"}
+    labels = ["time", *(parts[m[1]].format(m[3]) + m[2].lower() for m in found if m)]
+    body = [(i, row) for i, row in enumerate(rows[start + 1 :], start=start + 2) if row.strip()]
+    header["nrows"] = header.get("numberofsamples", "")
+    return header, tuple(labels), body, (), ("Forces of Cortex: points were read in mm, moments in N mm.",)
 
 
 def _vectors(labels: list[str], row: str, path: Path) -> tuple[str, ...]:

@@ -80,6 +80,16 @@ def head_text(head: bytes) -> str:
         return ""
 
 
+_RAW = {
+    "Qualisys QTM": (".qtm",),
+    "Vicon Nexus": (".x1d", ".x2d", ".xcp", ".system", ".history"),
+    "OptiTrack Motive": (".tak",),
+    "Cortex": (".cap", ".vc", ".anb", ".anc", ".trb"),
+    "Visual3D": (".cmz", ".cmo"),
+    "Excel": (".xls", ".xlsx"),
+    "MATLAB": (".mat",),
+}
+"""Files of programs that are not read, by extension."""
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 
 
@@ -110,6 +120,9 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
         )
     if extension in legal:
         return legal[extension]
+    for program, own in _RAW.items():
+        if extension in own:
+            raise FileRefused(f"{path}: is a file of {program}'s own. Export the C3D file, or a table as CSV.")
     raise FileRefused(f"{path}: its content is none of the formats that can be read. Legal are {', '.join(legal)}.")
 
 

@@ -175,8 +175,8 @@ def _by_pressure(number: int, load: Load, time: Array, turn: Array, corners: Arr
     travel = float(np.sqrt(((c - middle)[:, :2] ** 2).sum(axis=1).mean()))
     moment = np.concatenate([mx, my]) - np.cross(c, value[told, :3])[:, :2].T.ravel()
     rows = np.vstack([np.column_stack([none, fz, -fy]), np.column_stack([-fz, none, fx])])
-    # 1 N m for 0.1 m of height in every sample
-    weak = 10.0 * np.sqrt(fz.size) * np.array([0.0, 0.0, 1.0])
+    # as of one newton that shears each sample
+    weak = np.sqrt(fz.size) * np.array([0.0, 0.0, 1.0])
     point = np.linalg.lstsq(np.vstack([rows, weak]), np.append(-moment, weak[2] * middle[2]), rcond=None)[0]
     size = float(np.sqrt((fz**2).mean()))
     beside, free = (float(np.sqrt(2 * (one**2).mean())) / size for one in (moment + rows @ point, np.append(mx, my)))

@@ -1,4 +1,4 @@
-"""OpenSim's table of forces: plates without markers."""
+"""OpenSim's table of forces, and that of Cortex: plates without markers."""
 
 import math
 import re
@@ -26,13 +26,13 @@ _TURNED_BY = 0.1
 """
 
 NAME = "table of OpenSim"
-EXTENSIONS = (".mot", ".sto")
+EXTENSIONS = (".mot", ".sto", ".forces")
 PREFERENCE = 20
 
 
 def sniff(head: bytes) -> bool:
-    """Return whether the head has the line "endheader"."""
-    return bool(re.search(r"^\s*endheader\s*$", head_text(head), flags=re.MULTILINE | re.IGNORECASE))
+    """Return whether the head has the line "endheader", or begins with "[Force Data]"."""
+    return bool(re.search(r"^\s*endheader\s*$|\A\[Force Data\]", head_text(head), flags=re.MULTILINE | re.IGNORECASE))
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:

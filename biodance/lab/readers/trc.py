@@ -37,7 +37,7 @@ _TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
 PREFERENCE = 10
-_TABLES = (".mot", ".sto")
+_TABLES = (".mot", ".sto", ".forces")
 
 
 def sniff(head: bytes) -> bool:
@@ -53,8 +53,8 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
 
 
 def beside(path: Path) -> Path | None:
-    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged), in its
-    folder or in the one for forces beside it (MarkerData/ and ForceData/ or ID/); None if there is none.
+    """Return the table with plate columns that belongs to a .trc file (or should, but is damaged), in its folder or in
+    the one for forces beside it (MarkerData/ and ForceData/ or ID/); None if there is none.
 
     It has the stem of the markers with a usual ending, else it is the only one whose stem goes on behind theirs.
     """
