@@ -41,11 +41,14 @@ def loads(centre: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return load, centre + np.stack([x, y, 0 * x], axis=1)
 
 
-def nexus(folder: Path, *, change=lambda load: load, trajectories: bool = True, people=("S01",)) -> Path:
-    """Forces in N, N·mm about the plate's centre, every tenth sub frame a frame; from frame 121 on."""
+def nexus(folder: Path, *, change=lambda load: load, moved=0.0, trajectories: bool = True, people=("S01",)) -> Path:
+    """Forces in N, N·mm about the plate's centre, ten sub frames a frame, from frame 121 on; pressures ``moved`` m."""
     frames = 121 + np.arange(FRAMES)
     fine = np.column_stack([np.repeat(frames, EACH), np.tile(np.arange(EACH), FRAMES)])
-    table = [np.hstack([change(one) * [1, 1, 1, 1e3, 1e3, 1e3], 1e3 * at]) for one, at in (loads(*p) for p in PLATES)]
+    table = [
+        np.hstack([change(one) * [1, 1, 1, 1e3, 1e3, 1e3], 1e3 * (at + moved)])
+        for one, at in (loads(*p) for p in PLATES)
+    ]
     devices = "".join(f"AMTI #{k} - Force,,,AMTI #{k} - Moment,,,AMTI #{k} - CoP,,," for k in (1, 2))
     axes, units = ",Fx,Fy,Fz,Mx,My,Mz,Cx,Cy,Cz" * 2, ",N,N,N,N.mm,N.mm,N.mm,mm,mm,mm" * 2
     lines = ["Devices", "1000", f",,{devices}EMG - Voltage", f"Frame,Sub Frame{axes},EMG1", f",{units},V"]
@@ -198,6 +201,13 @@ def test_forces_that_contradict_their_own_pressure_are_left_out(tmp_path, signs)
     assert trial.plates == ()
     assert len(trial.warnings) == 2
     assert "points of pressure beside it do not follow from its force and moment" in trial.warnings[0]
+
+
+def test_pressures_that_lie_beside_the_feet_are_in_another_frame(tmp_path):
+    trial = read_trial(nexus(tmp_path, moved=np.array([0.9, -0.4, 0.0])))
+    assert trial.plates == ()
+    assert "m beside the feet: they are not in the frame of the markers" in " ".join(trial.history)
+    assert "The table does not say where plate1, plate2 lie" in trial.warnings[0]
 
 
 @pytest.mark.parametrize("point", [np.array([0.4, -0.3, -0.05]), None], ids=["any point", "each about its pressure"])

@@ -96,6 +96,18 @@ def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
     return float(np.nanmedian(moment[loaded] / force[loaded])) if loaded.any() else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Feet:
+    """Where the feet are: ``middle`` (F, 2) m where those on the ground are pressed at ``time`` (F,), NaN while none
+    is; ``standing`` (F,) whether both are and the person stands as high as ever; ``ends`` (F, 4, 2) m heels and toes.
+    """
+
+    time: Array
+    middle: Array
+    standing: Mask
+    ends: Array
+
+
 def table_plates(
     loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
 ) -> PlatesRead:
@@ -108,30 +120,34 @@ def table_plates(
     said = [told.plates.get(f"plate{number}", NOTHING_TOLD) for number in range(1, len(loads) + 1)]
     history = [f"plate{n} was left out, as session.toml says." for n, one in enumerate(said, 1) if not one.use]
     used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
-    placed: list[Plate] = []
-    doubts: list[str] = []
+    feet = _feet(markers, worn)
+    pressed = {n: _pressed(load, turn) for n, load, _ in used if load.pressure is not None}
+    if feet and (beside := _beside_feet([one for one in pressed.values() if one], time, feet)):
+        history.append(beside)
+        pressed = {}
+    placed, doubts, free = list[Plate](), list[str](), list[tuple[int, Load]]()
     for n, load, one in used:
         corners = one.corners if one.corners is not None or load.corners is None else load.corners @ turn.T
-        if load.pressure is not None and (done := _by_pressure(n, load, time, turn, corners)) is not None:
-            placed += done.plates
-            history += done.history
-        elif corners is not None and (load.pressure is None or one.corners is not None):
-            # along the plate's own axes, about its centre
-            turned, zero, zeroed = _zeroed(turned_wrench(load.value, plate_axes(corners)), time)
-            signed, sign = _upright(turned)
-            wrench = Wrench(time, wrench_about_origin(signed, corners.mean(axis=0)))
-            about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
-            decided = (about, zeroed, sign)
-            placed.append(Plate(f"plate{n}", 0, corners, wrench, decided, zero, columns=load.columns))
-        elif load.pressure is not None:
+        found = pressed.get(n)
+        if found is not None and found.loaded.any():
+            around = around_pressures(found.points, float(np.median(found.points[:, 2])))
+            plate = _plate(n, load, time, found.value, found.point, found.said, around if corners is None else corners)
+            placed.append(replace(plate, placed=corners is not None))
+        elif found is not None and corners is None:
+            history.append(f"plate{n} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
+        elif corners is not None and (found is not None or n not in pressed or one.corners is not None):
+            value = turned_wrench(load.value, plate_axes(corners))
+            along = "along the plate's own axes and about the centre of its corners"
+            placed.append(_plate(n, load, time, value, corners.mean(axis=0), along, corners))
+        elif n in pressed:
             doubts.append(
                 f"plate{n} ({load.columns}) was left out: the points of pressure beside it do not follow from its "
                 f"force and moment along the axes of the markers. Export all in the frame of the laboratory, or the "
                 f"C3D file."
             )
-    free = [(n, load) for n, load, one in used if one.corners is load.corners is load.pressure is None]
+        else:
+            free.append((n, load))
     if free:
-        feet = _feet(markers, worn)
         done = _by_feet(free, time, turn, feet)
         placed += done.plates
         history += done.history
@@ -149,14 +165,35 @@ def table_plates(
     return PlatesRead(tuple(plates), tuple(warnings), tuple(history))
 
 
+def _plate(number: int, load: Load, time: Array, value: Array, point: Array, along: str, corners: Array) -> Plate:
+    """Return a plate of known place of which ``value`` (T, 6) in the lab frame is about a ``point``."""
+    value, zero, zeroed = _zeroed(value, time)
+    signed, sign = _upright(value)
+    wrench = Wrench(time, wrench_about_origin(signed, point))
+    decided = (f"Columns {load.columns}, {along}.", zeroed, sign)
+    return Plate(f"plate{number}", 0, corners, wrench, decided, zero, columns=load.columns)
+
+
 _OFF = (0.001, 0.1)
 """m, and share of their travel, by which written points of pressure may lie beside those that follow (RMS): rounding,
 and a sign or an axis that is wrong moves them by twice their travel.
 """
 
 
-def _by_pressure(number: int, load: Load, time: Array, turn: Array, corners: Array | None) -> PlatesRead | None:
-    """Return a plate whose points of pressure the table says, in the lab frame; None where these do not fit.
+class _Pressed(NamedTuple):
+    """A load (T, 6) in the lab frame, where it is ``loaded`` (T,), and the ``points`` (n, 3) m of pressure there; the
+    ``point`` (3,) or (T, 3) m that its moments are about, which was found as is ``said``.
+    """
+
+    value: Array
+    loaded: Mask
+    points: Array
+    point: Array
+    said: str
+
+
+def _pressed(load: Load, turn: Array) -> _Pressed | None:
+    """Return which point moments are about by the points of pressure beside them; None where these do not fit.
 
     About a point of pressure c a load has no horizontal moment: M + (p - c) x F is vertical, where p is the point of
     the moments M. That is linear in p, and the mean height of the pressures is its height where nothing tells it.
@@ -165,39 +202,44 @@ def _by_pressure(number: int, load: Load, time: Array, turn: Array, corners: Arr
     own = None if load.corners is None else load.corners @ turn.T
     axes, origin = (turn, np.zeros(3)) if own is None else (plate_axes(own), own.mean(axis=0))
     value, points = turned_wrench(load.value, axes), origin + load.pressure @ axes.T
-    name = f"plate{number}"
-    told = np.isfinite(value).all(axis=1) & np.isfinite(points).all(axis=1) & (np.abs(value[:, 2]) >= COP_FORCE)
-    if not told.any():
-        said = f"{name} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out."
-        return PlatesRead(history=(said,))
-    (fx, fy, fz, mx, my, _), c = value[told].T, points[told]
+    on = np.isfinite(value).all(axis=1) & np.isfinite(points).all(axis=1) & (np.abs(value[:, 2]) >= COP_FORCE)
+    if not on.any():
+        return _Pressed(value, on, points[on], origin, "")
+    (fx, fy, fz, mx, my, _), c = value[on].T, points[on]
     middle, none = np.median(c, axis=0), np.zeros(fz.size)
-    travel = float(np.sqrt(((c - middle)[:, :2] ** 2).sum(axis=1).mean()))
-    moment = np.concatenate([mx, my]) - np.cross(c, value[told, :3])[:, :2].T.ravel()
+    moment = np.concatenate([mx, my]) - np.cross(c, value[on, :3])[:, :2].T.ravel()
     rows = np.vstack([np.column_stack([none, fz, -fy]), np.column_stack([-fz, none, fx])])
     # as of one newton that shears each sample
     weak = np.sqrt(fz.size) * np.array([0.0, 0.0, 1.0])
     point = np.linalg.lstsq(np.vstack([rows, weak]), np.append(-moment, weak[2] * middle[2]), rcond=None)[0]
     size = float(np.sqrt((fz**2).mean()))
-    beside, free = (float(np.sqrt(2 * (one**2).mean())) / size for one in (moment + rows @ point, np.append(mx, my)))
-    allowed = max(_OFF[0], _OFF[1] * travel)
-    if min(beside, free) > allowed:
+    off, free = (float(np.sqrt(2 * (one**2).mean())) / size for one in (moment + rows @ point, np.append(mx, my)))
+    travel = float(np.sqrt(((c - middle)[:, :2] ** 2).sum(axis=1).mean()))
+    if min(off, free) > max(_OFF[0], _OFF[1] * travel):
         return None
-    # The moments are about one point, or each about its pressure.
-    at = point if beside <= free else np.where(told[:, None], points, middle)
-    value, zero, empty = _zeroed(value, time)
-    value, sign = _upright(value)
-    wrench = Wrench(time, wrench_about_origin(value, at))
-    where = f"the point ({point[0]:.3f}, {point[1]:.3f}, {point[2]:.3f}) m" if beside <= free else "them"
-    about = (
-        f"Place: the points of pressure beside force and moment say it: the moments are about {where} (they differ by "
-        f"{1000 * min(beside, free):.2g} mm RMS)."
-    )
     along = "the axes of the markers" if own is None else "the plate's own axes"
-    decisions = (f"Columns {load.columns}, along {along}.", empty, sign, about)
-    surface = corners if corners is not None else around_pressures(c, float(middle[2]))
-    plate = Plate(name, 0, surface, wrench, decisions, zero, placed=corners is not None, columns=load.columns)
-    return PlatesRead((plate,))
+    where = "({:.3f}, {:.3f}, {:.3f}) m".format(*point) if off <= free else "of each pressure"
+    said = (
+        f"along {along} and about the point {where}, as the points of pressure beside them say (to "
+        f"{1000 * min(off, free):.2g} mm RMS)"
+    )
+    return _Pressed(value, on, c, point if off <= free else np.where(on[:, None], points, middle), said)
+
+
+def _beside_feet(pressed: Sequence[_Pressed], time: Array, feet: _Feet) -> str:
+    """Return that points of pressure lie beside the feet, so in another frame than the markers; "" = they do not."""
+    far = [0.0]
+    for one in pressed:
+        frame = np.clip(np.searchsorted(feet.time, time[one.loaded]), 0, feet.time.size - 1)
+        away = np.linalg.norm(feet.ends[frame] - one.points[:, None, :2], axis=2)
+        known = np.isfinite(away).all(axis=1)
+        far += [float(np.median(away[known].min(axis=1)))] * bool(known.any())
+    if max(far) <= _UNDER:
+        return ""
+    return (
+        f"The written points of pressure lie {max(far):.2f} m beside the feet: they are not in the frame of the "
+        f"markers and were not used."
+    )
 
 
 def _upright(value: Array) -> tuple[Array, str]:
@@ -220,17 +262,6 @@ def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
     return value - reads, reads[:3], said
 
 
-@dataclass(frozen=True, eq=False)
-class _Feet:
-    """Where the feet are: ``middle`` (F, 2) m where those on the ground are pressed at ``time`` (F,), NaN while none
-    is; ``standing`` (F,) whether both are and the person stands as high as ever.
-    """
-
-    time: Array
-    middle: Array
-    standing: Mask
-
-
 def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     """Return where the feet are by their heels and toes; None where the labels do not tell these."""
     if worn is None:
@@ -248,7 +279,8 @@ def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     middle = np.where(both[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
     # The mean of all markers while both feet are down.
     height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
-    return _Feet(markers.time, middle, as_high_as_ever(height, both))
+    ends_on_floor = places[..., :2].reshape(4, -1, 2).swapaxes(0, 1)
+    return _Feet(markers.time, middle, as_high_as_ever(height, both), ends_on_floor)
 
 
 def _pressure(value: Array) -> Array:
