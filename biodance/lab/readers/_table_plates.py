@@ -122,9 +122,11 @@ def table_plates(
     used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
     feet = _feet(markers, worn)
     pressed = {n: _pressed(load, turn) for n, load, _ in used if load.pressure is not None}
-    if feet and (beside := _beside_feet([one for one in pressed.values() if one], time, feet)):
-        history.append(beside)
-        pressed = {}
+    why = "the points of pressure beside it do not follow from its force and moment along the axes of the markers"
+    if feet and (far := _beside_feet([one for one in pressed.values() if one], time, feet)) > _UNDER:
+        why = f"the points of pressure beside it lie {far:.2f} m beside the feet, so in another frame than the markers"
+        # the feet tell where a single plate is
+        pressed = dict.fromkeys(pressed) if len(used) > 1 else {}
     placed, doubts, free = list[Plate](), list[str](), list[tuple[int, Load]]()
     for n, load, one in used:
         corners = one.corners if one.corners is not None or load.corners is None else load.corners @ turn.T
@@ -141,9 +143,8 @@ def table_plates(
             placed.append(_plate(n, load, time, value, corners.mean(axis=0), along, corners))
         elif n in pressed:
             doubts.append(
-                f"plate{n} ({load.columns}) was left out: the points of pressure beside it do not follow from its "
-                f"force and moment along the axes of the markers. Export all in the frame of the laboratory, or the "
-                f"C3D file."
+                f"plate{n} ({load.columns}) was left out: {why}. Export all in the frame of the laboratory, or the C3D "
+                f"file."
             )
         else:
             free.append((n, load))
@@ -226,20 +227,15 @@ def _pressed(load: Load, turn: Array) -> _Pressed | None:
     return _Pressed(value, on, c, point if off <= free else np.where(on[:, None], points, middle), said)
 
 
-def _beside_feet(pressed: Sequence[_Pressed], time: Array, feet: _Feet) -> str:
-    """Return that points of pressure lie beside the feet, so in another frame than the markers; "" = they do not."""
+def _beside_feet(pressed: Sequence[_Pressed], time: Array, feet: _Feet) -> float:
+    """Return how far (m) from the nearer foot the points of pressure lie, the median of the plate where it is most."""
     far = [0.0]
     for one in pressed:
         frame = np.clip(np.searchsorted(feet.time, time[one.loaded]), 0, feet.time.size - 1)
         away = np.linalg.norm(feet.ends[frame] - one.points[:, None, :2], axis=2)
-        known = np.isfinite(away).all(axis=1)
+        known = np.isfinite(away).all(axis=1) & (np.abs(one.value[one.loaded, 2]) >= _PERSON[0])
         far += [float(np.median(away[known].min(axis=1)))] * bool(known.any())
-    if max(far) <= _UNDER:
-        return ""
-    return (
-        f"The written points of pressure lie {max(far):.2f} m beside the feet: they are not in the frame of the "
-        f"markers and were not used."
-    )
+    return max(far)
 
 
 def _upright(value: Array) -> tuple[Array, str]:
