@@ -189,9 +189,8 @@ def test_qtm_says_where_plates_are_and_that_their_load_was_turned(tmp_path):
         assert plate.placed
         assert "plate's own axes" in plate.decisions[0]
         assert "load on the plate; all of it was turned" in " ".join(plate.decisions)
-    lacking = read_trial(qtm(tmp_path, frame="unheard-of"))
-    assert lacking.plates == ()
-    assert "squat_f_1.tsv does not say along which axes" in lacking.warnings[0]
+    with pytest.raises(FileRefused, match="the forces beside it do not say along which axes"):
+        read_trial(qtm(tmp_path, frame="unheard-of"))
 
 
 @pytest.mark.parametrize("signs", [(1, 1, 1, 1, -1, 1), (-1, -1, -1, 1, 1, 1)])
@@ -235,7 +234,7 @@ def test_forces_and_pressures_are_no_markers(tmp_path):
 def test_files_that_cannot_be_read_say_what_they_are(tmp_path):
     visual3d = "\n".join(["\tC:\\walk.c3d" * 6, "\tLASI" * 6, "\tTARGET" * 6, "\tORIGINAL" * 6, "ITEM" + "\tX" * 6])
     for name, text, sentence in (
-        ("walk.txt", visual3d + "\n1" + "\t0.5" * 6, "is an export of Visual3D, which does not say the rate"),
+        ("walk.txt", visual3d + "\n1" + "\t0.5" * 6, "is an export of Visual3D, which says no rate"),
         ("walk.qtm", "QTM\x01", "is a file of Qualisys QTM's own. Export the C3D file"),
         ("walk.tak", "\x02", "is a file of OptiTrack Motive's own"),
     ):

@@ -67,14 +67,11 @@ def read_tables(content: bytes, path: Path, *, least: int = 4) -> tuple[Cells, .
     found = [
         _of_text(text[title.start() : end], path, least, first=text.count("\n", 0, title.start()))
         for title, end in zip(titles, ends, strict=True)
-        if title[1] in _OF_NEXUS
+        if title[1] in ("Trajectories", "Devices")
     ]
     if not found:
         only = ", ".join(title[1] for title in titles)
-        raise FileRefused(
-            f"{path}: is an export of Vicon Nexus with {only} only. Export Trajectories and Devices, too, or the C3D "
-            f"file."
-        )
+        raise FileRefused(f"{path}: is an export of Vicon Nexus, of {only}. Export Trajectories and Devices, too.")
     return tuple(found)
 
 
@@ -83,7 +80,6 @@ def is_sectioned(text: str) -> bool:
     return bool(_TITLE.search(text))
 
 
-_OF_NEXUS = ("Trajectories", "Devices")
 _TITLE = re.compile(
     r"^(Devices|Events|Joints|Model Outputs|Segments|Trajectories)[,;\t]*\n(\d+(?:\.\d+)?)[,;\t]*$", re.MULTILINE
 )
@@ -93,7 +89,7 @@ _AXES = re.compile(r"Frame[,;\t](Sub Frame|Time \(Seconds\))[,;\t]", re.IGNORECA
 _LENGTHS = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 
-class Header(NamedTuple):
+class TableHeader(NamedTuple):
     """The last ``row`` (from 0) of a header, its ``separator``, the ``labels`` of the columns; the ``rate`` (Hz) of the
     rows where none of the columns is the time, else NaN; ``above`` as of `Cells`.
     """
@@ -105,7 +101,7 @@ class Header(NamedTuple):
     above: Mapping[str, Sequence[str]] = {}
 
 
-def header_of(text: str, *, least: int = 4) -> Header | None:
+def header_of(text: str, *, least: int = 4) -> TableHeader | None:
     """Return the labels of columns: the first row of >= ``least`` cells, most no numbers; where programs write names
     and axes in several rows, or names beside a keyword, one label a column is made of them.
     """
@@ -119,11 +115,11 @@ def header_of(text: str, *, least: int = 4) -> Header | None:
         for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
             found = tuple(cell.strip() for cell in line.split(separator))
             if len(found) >= least and _are_words(found):
-                return Header(row, separator, found)
+                return TableHeader(row, separator, found)
     return None
 
 
-def _of_keywords(lines: Sequence[str]) -> Header | None:
+def _of_keywords(lines: Sequence[str]) -> TableHeader | None:
     """Return the header of Qualisys QTM: a keyword and its values in each row, then labels, or none."""
     rows = [[cell.strip() for cell in line.rstrip("\t").split("\t")] for line in lines[:500]]
     keyword = re.compile(r"(?!SAMPLE$)[A-Z]+(_[A-Z0-9]+)*")
@@ -138,10 +134,10 @@ def _of_keywords(lines: Sequence[str]) -> Header | None:
             labels = ["Frame", "Time", *labels]
         last -= 1
     timed = "time" in map(str.lower, labels)
-    return Header(last, "\t", tuple(labels), math.nan if timed else _rate(above.get("FREQUENCY", [])), above)
+    return TableHeader(last, "\t", tuple(labels), math.nan if timed else _rate(above.get("FREQUENCY", [])), above)
 
 
-def _stacked(lines: Sequence[str], axes: int) -> Header:
+def _stacked(lines: Sequence[str], axes: int) -> TableHeader:
     """Return the header of axes in row ``axes`` under names in another: of Vicon Nexus, that spans names over the cells
     to their right and has units below and its rate above, or of OptiTrack Motive, of which measured markers are taken.
     """
@@ -149,19 +145,17 @@ def _stacked(lines: Sequence[str], axes: int) -> Header:
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines[: axes + 2], delimiter=separator)]
     width = len(rows[axes])
     if rows[axes][1].lower() == "sub frame":
-        names = [*rows[axes - 1], *[""] * width]
+        names, units = ([*row, *[""] * width] for row in (rows[axes - 1], *rows[axes + 1 :], [])[:2])
         for k in range(1, width):
             names[k] = names[k] or names[k - 1]
-        units = rows[axes + 1] if axes + 1 < len(rows) else []
-        units += [""] * width
         labels = [f"{n} {a} ({u})" if u else a for n, a, u in zip(names, rows[axes], units, strict=False)]
-        return Header(axes + 1, separator, tuple(labels), _rate(rows[axes - 2]))
+        return TableHeader(axes + 1, separator, tuple(labels), _rate(rows[axes - 2]))
     kinds, names, what = (*[row for row in rows[1:axes] if any(row)][:2], rows[axes - 1])
     pairs = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     unit = _LENGTHS.get(pairs.get("Length Units", "").lower(), "")
     ours = [(kind, part) == ("Marker", "Position") for kind, part in zip(kinds, what, strict=False)]
     labels = [f"{n} {a} ({unit})" if own else "" for n, a, own in zip(names, rows[axes], ours, strict=False)]
-    return Header(axes, separator, (*rows[axes][:2], *labels[2:], *[""] * (width - len(labels))))
+    return TableHeader(axes, separator, (*rows[axes][:2], *labels[2:], *[""] * (width - len(labels))))
 
 
 def _rate(cells: Sequence[str]) -> float:
@@ -186,10 +180,7 @@ def clean_label(cell: str) -> tuple[str, str]:
 def _of_text(text: str, path: Path, least: int, first: int = 0) -> Cells:
     """Return the table in ``text``, which begins behind ``first`` rows of its file."""
     if re.match(r"(?:.*\n){4}ITEM\t", text):
-        raise FileRefused(
-            f"{path}: is an export of Visual3D, which does not say the rate of its rows. Give the C3D file that it was "
-            f"made from."
-        )
+        raise FileRefused(f"{path}: is an export of Visual3D, which says no rate. Give the C3D file it was made from.")
     header = header_of(text, least=least)
     if header is None:
         raise FileRefused(f"{path}: no row holds the labels of columns. Write them into the first row, as LASI_x.")

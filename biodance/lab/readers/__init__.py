@@ -80,15 +80,8 @@ def head_text(head: bytes) -> str:
         return ""
 
 
-_RAW = {
-    "Qualisys QTM": (".qtm",),
-    "Vicon Nexus": (".x1d", ".x2d", ".xcp", ".system", ".history"),
-    "OptiTrack Motive": (".tak",),
-    "Cortex": (".cap", ".vc", ".anb", ".anc", ".trb"),
-    "Visual3D": (".cmz", ".cmo"),
-    "Excel": (".xls", ".xlsx"),
-    "MATLAB": (".mat",),
-}
+_RAW = {".qtm": "Qualisys QTM", ".x1d": "Vicon Nexus", ".x2d": "Vicon Nexus", ".tak": "OptiTrack Motive"}
+_RAW |= {".cap": "Cortex", ".anb": "Cortex", ".anc": "Cortex", ".cmz": "Visual3D", ".xlsx": "Excel", ".mat": "MATLAB"}
 """Files of programs that are not read, by extension."""
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 
@@ -120,9 +113,8 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
         )
     if extension in legal:
         return legal[extension]
-    for program, own in _RAW.items():
-        if extension in own:
-            raise FileRefused(f"{path}: is a file of {program}'s own. Export the C3D file, or a table as CSV.")
+    if extension in _RAW:
+        raise FileRefused(f"{path}: is a file of {_RAW[extension]}'s own. Export the C3D file, or a table as CSV.")
     raise FileRefused(f"{path}: its content is none of the formats that can be read. Legal are {', '.join(legal)}.")
 
 

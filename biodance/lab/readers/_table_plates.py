@@ -5,13 +5,17 @@ the feet.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from biodance.errors import FileRefused
 from biodance.lab.markers.sets import MarkerSet, landmark
+from biodance.lab.markers.time_axis import TimeAxis
 from biodance.lab.markers.upright import METRES, as_high_as_ever, on_the_ground
 from biodance.lab.plates import C3D_ONLY, FORCE, MOMENT, NOTHING_TOLD, Told, plain_unit
 from biodance.lab.plates.decode import around_pressures, find_baseline, plate_axes
@@ -32,6 +36,11 @@ class Load(NamedTuple):
     pressure: Array | None = None
     corners: Array | None = None
 
+    def at(self, clock: TimeAxis) -> "Load":
+        """Return the load at the equal steps of its clock."""
+        pressure = None if self.pressure is None else clock.at(self.pressure)
+        return self._replace(value=clock.at(self.value), pressure=pressure)
+
 
 _PERSON = (50.0, 4000.0)  # N that the mean load on plates can be: a child of 5 kg to 400 kg
 _SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
@@ -42,8 +51,24 @@ laboratories on plates of known place, 13 mm before the middle, sd 13 mm along t
 """
 
 
+def corners_of(above: Mapping[str, Sequence[str]], path: Path) -> Array | None:
+    """Return the corners (4, 3) m of a plate of Qualisys QTM whose axes are its own; None for those of the lab."""
+    frame = " ".join(above.get("DESCRIPTION", ())).lower()
+    if above.get("DATA_INCLUDED") != ["Force"] or re.search("world|lab", frame):
+        return None
+    if "local" not in frame:
+        raise FileRefused(f"{path}: the forces beside it do not say along which axes (DESCRIPTION). Export them again.")
+    places = ("POSX_POSY", "NEGX_POSY", "NEGX_NEGY", "POSX_NEGY")
+    rows = [[above[f"FORCE_PLATE_CORNER_{place}_{axis}"][0] for axis in "XYZ"] for place in places]
+    return np.array(rows, dtype=float) * METRES["mm"]
+
+
 def loads_of(
-    groups: Sequence[tuple[int, ...]], labels: Sequence[str], units: Sequence[str], values: Array
+    groups: Sequence[tuple[int, ...]],
+    labels: Sequence[str],
+    units: Sequence[str],
+    values: Array,
+    corners: Array | None = None,
 ) -> tuple[list[Load], str]:
     """Return the load on every plate in N and N·m, and the sentence that says in which units it was written.
 
@@ -69,6 +94,7 @@ def loads_of(
             f"{labels[group[0]]} ... {labels[group[5]]}",
             values[:, list(group[:6])] * factors,
             _metres(values[:, list(group[6:])], units[group[6]]) if group[6:] else None,
+            corners,
         )
         for group in groups
     ]
@@ -121,49 +147,56 @@ def table_plates(
     history = [f"plate{n} was left out, as session.toml says." for n, one in enumerate(said, 1) if not one.use]
     used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
     feet = _feet(markers, worn)
-    pressed = {n: _pressed(load, turn) for n, load, _ in used if load.pressure is not None}
-    why = "the points of pressure beside it do not follow from its force and moment along the axes of the markers"
-    if feet and (far := _beside_feet([one for one in pressed.values() if one], time, feet)) > _UNDER:
-        why = f"the points of pressure beside it lie {far:.2f} m beside the feet, so in another frame than the markers"
-        # the feet tell where a single plate is
-        pressed = dict.fromkeys(pressed) if len(used) > 1 else {}
-    placed, doubts, free = list[Plate](), list[str](), list[tuple[int, Load]]()
-    for n, load, one in used:
-        corners = one.corners if one.corners is not None or load.corners is None else load.corners @ turn.T
-        found = pressed.get(n)
-        if found is not None and found.loaded.any():
-            around = around_pressures(found.points, float(np.median(found.points[:, 2])))
-            plate = _plate(n, load, time, found.value, found.point, found.said, around if corners is None else corners)
-            placed.append(replace(plate, placed=corners is not None))
-        elif found is not None and corners is None:
-            history.append(f"plate{n} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
-        elif corners is not None and (found is not None or n not in pressed or one.corners is not None):
-            value = turned_wrench(load.value, plate_axes(corners))
-            along = "along the plate's own axes and about the centre of its corners"
-            placed.append(_plate(n, load, time, value, corners.mean(axis=0), along, corners))
-        elif n in pressed:
-            doubts.append(
-                f"plate{n} ({load.columns}) was left out: {why}. Export all in the frame of the laboratory, or the C3D "
-                f"file."
-            )
-        else:
-            free.append((n, load))
-    if free:
-        done = _by_feet(free, time, turn, feet)
-        placed += done.plates
-        history += done.history
-        if done.warnings:
-            return PlatesRead(tuple(placed), (*doubts, *done.warnings), tuple(history))
+    pressed = _all_pressed({n: load for n, load, _ in used if load.pressure is not None}, time, turn, feet)
+    known = {n: _of_known_place(n, load, time, turn, one.corners, pressed.get(n)) for n, load, one in used}
+    free = [(n, load) for n, load, _ in used if known[n] is None]
+    done = _by_feet(free, time, turn, feet) if free else PlatesRead()
+    parts = [*filter(None, known.values()), done]
+    placed = tuple(chain(*(one.plates for one in parts)))
+    doubts = tuple(chain(*(one.warnings for one in parts)))
+    history += chain(*(one.history for one in parts))
+    if done.warnings:
+        return PlatesRead(placed, doubts, tuple(history))
+    plates, idle = _followed(placed, told)
+    return PlatesRead(plates, (*doubts, *idle), tuple(history))
+
+
+def _followed(placed: Sequence[Plate], told: Told) -> tuple[tuple[Plate, ...], list[str]]:
+    """Return the plates in order with the feet that session.toml says, and what of it cannot be followed."""
     plates = []
     for plate in sorted(placed, key=lambda one: int(one.name.removeprefix("plate"))):
         one = told.plates.get(plate.name, NOTHING_TOLD)
         followed = [f"{one.sentence[0].upper()}{one.sentence[1:]}"] if one.sentence else []
         plates.append(replace(plate, foot=one.foot, decisions=(*plate.decisions, *followed)))
     idle = {name: ", ".join(key for key in one.keys if key in C3D_ONLY) for name, one in told.plates.items()}
-    warnings = doubts + [
+    return tuple(plates), [
         f"{name}: {keys} of session.toml can be followed in C3D files only." for name, keys in idle.items() if keys
     ]
-    return PlatesRead(tuple(plates), tuple(warnings), tuple(history))
+
+
+def _of_known_place(
+    n: int, load: Load, time: Array, turn: Array, told: Array | None, found: "_Pressed | str | None"
+) -> PlatesRead | None:
+    """Return plate ``n`` by its points of pressure, as ``found`` or why they cannot be used, else by corners that
+    session.toml has ``told`` or its file says; None without either.
+    """
+    corners = told if told is not None or load.corners is None else load.corners @ turn.T
+    name = f"plate{n} ({load.columns})"
+    if isinstance(found, _Pressed) and found.loaded.any():
+        around = around_pressures(found.points, float(np.median(found.points[:, 2])))
+        plate = _plate(n, load, time, found.value, found.point, found.said, around if corners is None else corners)
+        return PlatesRead((replace(plate, placed=corners is not None),))
+    if corners is not None and (told is not None or not isinstance(found, str)):
+        value, along = turned_wrench(load.value, plate_axes(corners)), "along the plate's own axes and about the centre"
+        return PlatesRead((_plate(n, load, time, value, corners.mean(axis=0), f"{along} of its corners", corners),))
+    if isinstance(found, _Pressed):
+        return PlatesRead(history=(f"{name} is never loaded above {COP_FORCE:g} N and was left out.",))
+    if not found:
+        return None
+    doubt = (
+        f"{name} was left out: the points of pressure beside it {found}. Export all in the frame of the laboratory, "
+    )
+    return PlatesRead(warnings=(f"{doubt}or the C3D file.",))
 
 
 def _plate(number: int, load: Load, time: Array, value: Array, point: Array, along: str, corners: Array) -> Plate:
@@ -193,8 +226,8 @@ class _Pressed(NamedTuple):
     said: str
 
 
-def _pressed(load: Load, turn: Array) -> _Pressed | None:
-    """Return which point moments are about by the points of pressure beside them; None where these do not fit.
+def _pressed(load: Load, turn: Array) -> _Pressed | str:
+    """Return which point moments are about by the points of pressure beside them; where these do not fit, that.
 
     About a point of pressure c a load has no horizontal moment: M + (p - c) x F is vertical, where p is the point of
     the moments M. That is linear in p, and the mean height of the pressures is its height where nothing tells it.
@@ -217,7 +250,7 @@ def _pressed(load: Load, turn: Array) -> _Pressed | None:
     off, free = (float(np.sqrt(2 * (one**2).mean())) / size for one in (moment + rows @ point, np.append(mx, my)))
     travel = float(np.sqrt(((c - middle)[:, :2] ** 2).sum(axis=1).mean()))
     if min(off, free) > max(_OFF[0], _OFF[1] * travel):
-        return None
+        return "do not follow from its force and moment along the axes of the markers"
     along = "the axes of the markers" if own is None else "the plate's own axes"
     where = "({:.3f}, {:.3f}, {:.3f}) m".format(*point) if off <= free else "of each pressure"
     said = (
@@ -227,15 +260,23 @@ def _pressed(load: Load, turn: Array) -> _Pressed | None:
     return _Pressed(value, on, c, point if off <= free else np.where(on[:, None], points, middle), said)
 
 
-def _beside_feet(pressed: Sequence[_Pressed], time: Array, feet: _Feet) -> float:
-    """Return how far (m) from the nearer foot the points of pressure lie, the median of the plate where it is most."""
-    far = [0.0]
-    for one in pressed:
-        frame = np.clip(np.searchsorted(feet.time, time[one.loaded]), 0, feet.time.size - 1)
-        away = np.linalg.norm(feet.ends[frame] - one.points[:, None, :2], axis=2)
-        known = np.isfinite(away).all(axis=1) & (np.abs(one.value[one.loaded, 2]) >= _PERSON[0])
-        far += [float(np.median(away[known].min(axis=1)))] * bool(known.any())
-    return max(far)
+def _all_pressed(
+    loads: Mapping[int, Load], time: Array, turn: Array, feet: _Feet | None
+) -> Mapping[int, _Pressed | str]:
+    """Return what the points of pressure say of each plate; that they cannot be used where one lies beside the feet."""
+    pressed = {n: _pressed(load, turn) for n, load in loads.items()}
+    far = 0.0
+    for one in pressed.values():
+        if feet is not None and isinstance(one, _Pressed):
+            frame = np.clip(np.searchsorted(feet.time, time[one.loaded]), 0, feet.time.size - 1)
+            away = np.linalg.norm(feet.ends[frame] - one.points[:, None, :2], axis=2).min(axis=1)
+            known = np.isfinite(away) & (np.abs(one.value[one.loaded, 2]) >= _PERSON[0])
+            far = max(far, float(np.median(away[known])) if known.any() else 0.0)
+    if far <= _UNDER:
+        return pressed
+    why = f"lie {far:.2f} m beside the feet, so in another frame than the markers"
+    # The feet tell where a single plate is.
+    return dict.fromkeys(pressed, why) if len(pressed) > 1 else {}
 
 
 def _upright(value: Array) -> tuple[Array, str]:

@@ -3,9 +3,9 @@ say them, numbers with decimal points or commas.
 
 Of plates a table says three forces and three moments, and neither about which point nor along which axes. They are
 taken along the axes of the markers, in the unit of the labels or that in which they weigh a person, with the sign that
-pushes up, where session.toml says. Else, where the pressures that follow lie under the feet, the moments are about the
-lab's origin; where they lie elsewhere and a single plate carries everything, about its own, which is put where the feet
-stand.
+pushes up, about the point that the points of pressure beside them say, or where session.toml says. Else, where the
+pressures that follow lie under the feet, the moments are about the lab's origin; where they lie elsewhere and a single
+plate carries everything, about its own, which is put where the feet stand.
 """
 
 import math
@@ -21,7 +21,7 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import split_label, unlabelled
 from biodance.lab.c3d.subject import people_of
-from biodance.lab.cells import Cells, clean_label, header_of, is_parquet, is_sectioned, read_cells, read_tables
+from biodance.lab.cells import Cells, clean_label, header_of, is_parquet, is_sectioned, read_tables
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import read_marker_set, recognise
 from biodance.lab.markers.signals import unseen_at_origin
@@ -29,8 +29,8 @@ from biodance.lab.markers.time_axis import TimeAxis, camera_instants, resampled,
 from biodance.lab.markers.upright import METRES, axis_to_head, body_is_tall_along_z, extents, likely_unit, turn_to
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates import Told, channel_groups
-from biodance.lab.readers import head_text
-from biodance.lab.readers._table_plates import Load, loads_of, table_plates
+from biodance.lab.readers import head_text, read_head
+from biodance.lab.readers._table_plates import Load, corners_of, loads_of, table_plates
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _TIME = re.compile(
@@ -73,29 +73,40 @@ def columns_in(labels: Sequence[str]) -> TableColumns:
     """Return what the columns with these ``labels`` hold."""
     times = ((k, match[1] or "") for k, label in enumerate(labels) if (match := _TIME.fullmatch(label)))
     time, unit = next(times, (None, ""))
-    forces = [
-        _TURNED.sub(lambda m: ("F" if m[1] and m[1][0] in "fF" else "M") + (m[2] or m[4]), label) for label in labels
-    ]
-    plates = tuple(group for group in channel_groups(forces) if len(group) == 6)
-    # As forces, the pressures stand beside the moments of their plate.
-    pressed = [_PRESSURE.sub(r"F\1", x) if _PRESSURE.search(x) else re.sub(r"(?i)f([xyz])", "", x) for x in forces]
-    points = {group[3]: group[:3] for group in channel_groups(pressed) if len(group) == 6}
-    plates = tuple((*plate, *points.get(plate[3], ())) for plate in plates)
-    taken = {time, *chain(*plates)}
+    plates, lone = _plates_in(labels)
+    taken = {time, *lone, *chain(*plates)}
     free = [k for k in range(len(labels)) if k not in taken]
-    lone = [k for k in free if _CHANNEL.search(forces[k]) or _PRESSURE.search(labels[k])]
-    free = [k for k in free if k not in lone]
+    found, length = _marker_columns(labels, free)
+    markers = _with_all_axes(found)
+    broken = tuple(name for name, axes in found.items() if len(axes) == 2)
+    used = taken.union(*markers.values())
+    others = tuple(label for k, label in enumerate(labels) if k not in used and label)
+    return TableColumns(time, unit, markers, length, plates, others, broken, tuple(labels[k] for k in lone))
+
+
+def _marker_columns(labels: Sequence[str], free: Sequence[int]) -> tuple[dict[str, dict[str, int]], str]:
+    """Return the columns of each marker by axis, in the notation that gives most, and the unit of length."""
     behind = _triples(labels, free, r"(.+?)[\s_.:\-]*([xyz])", 2)
     before = _triples(labels, free, r"([xyz])[\s_.:\-]+(.+?)", 1)
     found, length = max((behind, before), key=lambda notation: len(_with_all_axes(notation[0])))
     # Where markers are NAME.PosX, NAME.RotX is none.
     places = {place[1]: axes for name, axes in found.items() if (place := _PLACE.fullmatch(name))}
-    found = places if len(_with_all_axes(places)) >= FEWEST_MARKERS else found
-    markers = _with_all_axes(found)
-    broken = tuple(name for name, axes in found.items() if len(axes) == 2)
-    used = taken.union(lone, *markers.values())
-    others = tuple(label for k, label in enumerate(labels) if k not in used and label)
-    return TableColumns(time, unit, markers, length, plates, others, broken, tuple(labels[k] for k in lone))
+    return (places if len(_with_all_axes(places)) >= FEWEST_MARKERS else found), length
+
+
+def _plates_in(labels: Sequence[str]) -> tuple[tuple[tuple[int, ...], ...], list[int]]:
+    """Return the columns of each plate, first of Fx Fy Fz Mx My Mz, then of its point of pressure; and those of forces,
+    moments and pressures that make none.
+    """
+    forces = [
+        _TURNED.sub(lambda m: ("F" if m[1] and m[1][0] in "fF" else "M") + (m[2] or m[4]), label) for label in labels
+    ]
+    # As forces, the pressures stand beside the moments of their plate.
+    pressed = [_PRESSURE.sub(r"F\1", x) if _PRESSURE.search(x) else re.sub(r"(?i)f([xyz])", "", x) for x in forces]
+    points = {group[3]: group[:3] for group in channel_groups(pressed) if len(group) == 6}
+    plates = tuple((*group, *points.get(group[3], ())) for group in channel_groups(forces) if len(group) == 6)
+    rest = set(range(len(labels))).difference(*plates)
+    return plates, [k for k in sorted(rest) if _CHANNEL.search(forces[k]) or _PRESSURE.search(labels[k])]
 
 
 def _with_all_axes(found: Mapping[str, Mapping[str, int]]) -> dict[str, tuple[int, int, int]]:
@@ -148,8 +159,9 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     FileRefused
         No table, no time, fewer than three markers, a time that does not increase, a marker cloud of no person's size.
     """
-    content = read_bytes(path)
-    tables = read_tables(content, path)
+    files = [path, *_plates_beside(path)]
+    contents = [read_bytes(file) for file in files]
+    tables = [table for file, content in zip(files, contents, strict=True) for table in read_tables(content, file)]
     cells = max(tables, key=lambda one: len(columns_in(one.labels).markers))
     columns = columns_in(cells.labels)
     own, chosen = _of_subject(columns.markers, subject, path)
@@ -165,22 +177,12 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     instants, arrived = camera_instants(stamps, rows.xyz)
     axis, rows = time_axis(instants, where=str(path)), replace(rows, time=instants)
     axis = replace(axis, stamps=axis.stamps - axis.time[0], time=axis.time - axis.time[0])
-    forces, corners, doubts = (cells, (), []) if columns.plates else _forces_of(path, cells, tables)
-    held = columns_in(forces.labels)
-    loads, weighed = loads_of(held.plates, forces.labels, forces.units, forces.values)
-    clock = axis
-    if loads and forces is not cells:
-        start = forces.values[0, held.time] - cells.values[0, columns.time]
-        clock = time_axis(_stamps(forces, held, path)[0] + start, where=str(path))
-    sampled = [
-        Load(one.columns, clock.at(one.value), None if one.pressure is None else clock.at(one.pressure), place)
-        for one, place in zip(loads, corners or [None] * len(loads), strict=True)
-    ]
+    loads, clock, weighed = _loads(cells, columns, tables, axis, path)
     known = recognise(rows.names)
     guess = "" if known else guess_set(rows).name
     worn = read_marker_set(guess) if guess else known
     markers, unseen = resampled(rows.names, rows.xyz, axis)
-    plates = table_plates(sampled, clock.time, turn, markers, worn, told or Told())
+    plates = table_plates([one.at(clock) for one in loads], clock.time, turn, markers, worn, told or Told())
     history = (
         *cells.said,
         *chosen,
@@ -188,26 +190,50 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
         *timed,
         *lengths,
         *unseen,
-        *([weighed] if weighed else []),
+        *weighed,
         *([arrived] if arrived else []),
         *_time_said(axis, rows, loads if clock is axis else []),
         *plates.history,
     )
     rate = plates.plates[0].wrench.rate if plates.plates else math.nan
-    source = Source(path, sha256(content), "table", rate=markers.rate, analog_rate=rate)
-    warnings = [*([axis.said] if not axis.sampled and axis.said else []), *doubts, *plates.warnings]
-    if columns.lone and not loads:
-        warnings.append(
-            f"{', '.join(columns.lone[:6])}: these are no markers, and a plate has three forces and three moments: no "
-            f"force was read. Export Fx, Fy, Fz, Mx, My and Mz."
-        )
-    if columns.broken:
-        lacking = (
-            f"Of {', '.join(columns.broken)} only two coordinates are there: they were left out. Export all three."
-        )
-        warnings.insert(0, lacking)
+    source = Source(path, sha256(b"".join(contents)), "table", rate=markers.rate, analog_rate=rate)
+    warnings = [*_lacking(columns, loads), *([axis.said] if not axis.sampled and axis.said else []), *plates.warnings]
     name = known.name if known else ""
     return Trial(path.stem, role, markers, plates.plates, source, name, history=history, warnings=tuple(warnings))
+
+
+def _lacking(columns: TableColumns, loads: Sequence[Load]) -> list[str]:
+    """Say which columns lack others to be a marker or a plate."""
+    said = []
+    if columns.broken:
+        lacking = ", ".join(columns.broken)
+        said.append(f"Of {lacking} only two coordinates are there: they were left out. Export all three.")
+    if columns.lone and not loads:
+        said.append(
+            f"{', '.join(columns.lone[:6])} are no markers, and no force was read from them: a plate has Fx, Fy, Fz, "
+            f"Mx, My and Mz. Export all six."
+        )
+    return said
+
+
+def _loads(
+    cells: Cells, columns: TableColumns, tables: Sequence[Cells], axis: TimeAxis, path: Path
+) -> tuple[list[Load], TimeAxis, list[str]]:
+    """Return the loads in the table of the markers, else in the others, which have one clock; that clock, from the
+    first row of the markers on; and sentences about units.
+    """
+    loads, said = list[Load](), list[str]()
+    for forces in [cells] if columns.plates else tables:
+        held = columns_in(forces.labels)
+        if forces is not cells and held.plates:
+            since = _stamps(forces, held, path)[0]
+            axis = time_axis(since + forces.values[0, held.time] - cells.values[0, columns.time], where=str(path))
+        some, units = loads_of(held.plates, forces.labels, forces.units, forces.values, corners_of(forces.above, path))
+        loads += some
+        said += [units] * bool(units)
+    if any(len(one.value) != len(axis.stamps) for one in loads):
+        raise FileRefused(f"{path}: the forces beside it have different lengths. Export them again.")
+    return loads, axis, said
 
 
 def _of_subject(
@@ -224,47 +250,15 @@ def _of_subject(
         )
     chosen = subject if subject in people else next(iter(people), "")
     own = {name: axes for (person, name), axes in named.items() if person in ("", chosen)}
-    said = [f"Markers of subject {chosen!r} taken, the prefix removed."] * bool(chosen)
-    if left := len(found) - len(own):
-        said.append(f"{left} points that are unlabelled or of others are left out.")
-    return own, said
+    left = len(found) - len(own)
+    said = [f"Markers of {chosen or 'the person'} taken; {left} points unlabelled or of others are left out."]
+    return own, said * bool(chosen or left)
 
 
-def _forces_of(path: Path, cells: Cells, tables: Sequence[Cells]) -> tuple[Cells, tuple[Array | None, ...], list[str]]:
-    """Return the table of the forces beside that of the markers, the corners (4, 3) m of each plate whose axes are its
-    own, and doubts: another section of a file of Vicon Nexus, or the files NAME_f_1.tsv ... of Qualisys QTM.
-    """
-    others = [one for one in tables if one is not cells and columns_in(one.labels).plates]
-    if others or not cells.above:
-        return (others or [cells])[0], (), []
-    labels, units, values, corners = list[str](), list[str](), list[Array](), list[Array | None]()
-    out = "The forces beside the markers were left out"
-    for file in sorted(path.parent.glob(f"{escape(path.stem)}_f_*{path.suffix}")):
-        table = read_cells(read_bytes(file), file)
-        frame = " ".join(table.above.get("DESCRIPTION", ())).lower()
-        if values and len(table.values) != len(values[0]):
-            return cells, (), [f"{out}: {file.name} has another length."]
-        if not re.search("local|world|lab", frame):
-            return (
-                cells,
-                (),
-                [f"{out}: {file.name} does not say along which axes (DESCRIPTION)."],
-            )
-        number = file.stem.rpartition("_")[2]
-        labels += [label if label.lower() == "time" else f"plate{number} {label}" for label in table.labels]
-        units += table.units
-        values.append(table.values)
-        corners.append(_corners(table.above) if "local" in frame else None)
-    if not values:
-        return cells, (), []
-    return Cells(tuple(labels), tuple(units), np.hstack(values)), tuple(corners), []
-
-
-def _corners(above: Mapping[str, Sequence[str]]) -> Array:
-    """Return the corners (4, 3) m of a plate of Qualisys QTM, which are in mm."""
-    places = ("POSX_POSY", "NEGX_POSY", "NEGX_NEGY", "POSX_NEGY")
-    rows = [[above[f"FORCE_PLATE_CORNER_{place}_{axis}"][0] for axis in "XYZ"] for place in places]
-    return np.array(rows, dtype=float) * METRES["mm"]
+def _plates_beside(path: Path) -> list[Path]:
+    """Return the files of the plates, NAME_f_1.tsv and so on, beside the markers of Qualisys QTM."""
+    alike = sorted(path.parent.glob(f"{escape(path.stem)}_f_*{escape(path.suffix)}"))
+    return [file for file in alike if "DATA_INCLUDED\tForce" in head_text(read_head(file))]
 
 
 def _stamps(cells: Cells, columns: TableColumns, path: Path) -> tuple[Array, list[str]]:
