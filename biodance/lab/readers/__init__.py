@@ -113,9 +113,10 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
         )
     if extension in legal:
         return legal[extension]
+    what = "its content is none of the formats that can be read"
     if extension in _RAW:
-        raise FileRefused(f"{path}: is a file of {_RAW[extension]}'s own. Export the C3D file, or a table as CSV.")
-    raise FileRefused(f"{path}: its content is none of the formats that can be read. Legal are {', '.join(legal)}.")
+        what = f"is a file of {_RAW[extension]}'s own. Export the C3D file, or a table as CSV"
+    raise FileRefused(f"{path}: {what}. Legal are {', '.join(legal)}.")
 
 
 def read_head(path: Path) -> bytes:
