@@ -22,7 +22,7 @@ from biodance.body.tables.anthropometry import (
     read_table,
     row_numbers,
 )
-from biodance.lab.markers.sets import MARKED_SEGMENTS
+from biodance.lab.markers.sets import MARKED_SEGMENTS, part_of
 from biodance.records import SIDES, Array, Subject
 from biodance.settings import STANDARD_GRAVITY
 
@@ -33,16 +33,6 @@ JOINTS = (
     *("right_shoulder", "right_elbow", "left_shoulder", "left_elbow"),
 )
 """Anatomical joints; each is one to three ``Joint`` records named ``<joint>_<movement>``."""
-
-
-def kind_of(segment: str) -> str:
-    """Return the segment's name without its side: ``left_thigh`` -> ``thigh``."""
-    return segment.removeprefix("right_").removeprefix("left_")
-
-
-def side_of(segment: str) -> float:
-    """Return +1 for a right or midline segment, -1 for a left one (the sign of z)."""
-    return -1.0 if segment.startswith("left_") else 1.0
 
 
 def upright_to(point: Array) -> Array:
@@ -89,7 +79,7 @@ def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
         for joint, kind in (("knee", "thigh"), ("ankle", "shank"), ("elbow", "upper_arm")):
             origins[f"{side}_{joint}"] = np.array([0.0, -kinds[kind], 0.0])
     ankle = proportion("ankle_height", sex) * stature
-    lengths = {segment: kinds[kind_of(segment)] for segment in SEGMENTS}
+    lengths = {segment: kinds[part_of(segment)] for segment in SEGMENTS}
     heel = proportion("heel_behind_ankle", sex) * kinds["foot"]
     asis = proportion("asis_width", sex) * stature
     return Skeleton(lengths, origins, dict.fromkeys(SIDES, ankle), dict.fromkeys(SIDES, heel), asis, stature)
@@ -405,7 +395,7 @@ def _ranged(body: Body) -> Body:
     rows = {row["joint"]: row for row in read_table("human", "optional_joints").rows}
     lower, upper, joints = np.array(body.limits.lower), np.array(body.limits.upper), list[Joint]()
     for i, joint in enumerate(body.joints):
-        row = rows.get(kind_of(joint.name))
+        row = rows.get(part_of(joint.name))
         if row is not None:
             upper[i] = np.radians(float(row["range_deg"]))
             lower[i] = -upper[i]
@@ -423,7 +413,7 @@ def marker_groups(body: Body) -> tuple[str, ...]:
     neck = np.inf if places is None else float(places[0][1])
     groups = []
     for segment, height in zip(body.markers.segment, body.markers.position[:, 1], strict=True):
-        kind = kind_of(body.links[segment])
+        kind = part_of(body.links[segment])
         head = kind == "head" or (kind == "trunk_head" and height > neck)
         trunk, arms = kind in ("trunk_head", "clavicle"), kind in ("upper_arm", "forearm_hand", "hand")
         groups.append("head" if head else "arms" if arms else "trunk" if trunk else "legs")

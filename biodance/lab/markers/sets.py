@@ -200,7 +200,7 @@ def segment_of(landmark: str) -> str:
 
 
 def part_of(landmark: str) -> str:
-    """Return a landmark without its side."""
+    """Return a landmark, segment or joint without its side: ``left_thigh`` -> ``thigh``."""
     return landmark.partition("_")[2] if landmark.startswith(SIDES) else landmark
 
 
