@@ -301,13 +301,6 @@ class _PersonLabels:
         return may
 
 
-_FROM_VIDEO = (
-    "These labels are joints, as software estimates them from video, not markers on the skin: {named}. A body is "
-    "placed by markers on both iliac spines, at the side of knees and ankles, on heels and toes. Give positions of "
-    "markers, for example the augmented markers (.trc) of the same software."
-)
-
-
 @dataclass(frozen=True, eq=False)
 class _GuessedSet:
     """What was guessed: ``map`` label -> landmark or segment, "" ``name`` where it is not believed; ``doubts`` why
@@ -327,7 +320,12 @@ def guess_set(markers: Markers) -> _GuessedSet:
     at = upright.median_places(markers, upright.posture_frames(markers)[0])
     found = _guessed(at)
     joints = () if found.name else joints_from_video(at)
-    return replace(found, doubts=(_FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
+    said = (
+        "These labels are joints, as software estimates them from video, not markers on the skin: "
+        f"{', '.join(joints)}. A body is placed by markers on both iliac spines, at the side of knees and ankles, on "
+        "heels and toes. Give positions of markers, for example the augmented markers (.trc) of the same software."
+    )
+    return replace(found, doubts=(said, *found.doubts)) if joints else found
 
 
 def _guessed(at: Mapping[str, Array]) -> _GuessedSet:
