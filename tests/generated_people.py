@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from biodance.body.human.skeleton import Skeleton, kind_of
+from biodance.body.human.skeleton import Skeleton
+from biodance.lab.markers.sets import part_of
 
 _KNOTS = {
     "thigh": ((0, 0.2, 0.4, 0.6, 0.8, 1), (94, 89, 83, 74, 63, 57)),
@@ -139,7 +140,7 @@ def measured_lengths(person: GeneratedPerson, generic: Skeleton, rng: np.random.
     own = person.lengths | {"forearm_hand": person.lengths["forearm"]}
     own |= {"pelvis": own["lower_trunk"], "trunk_head": own["lower_trunk"] + own["upper_trunk"]}
     lengths = {
-        segment: own[kind_of(segment)] + rng.normal(0, 0.005) if kind_of(segment) in own else length
+        segment: own[part_of(segment)] + rng.normal(0, 0.005) if part_of(segment) in own else length
         for segment, length in generic.lengths.items()
     }
     return replace(generic, lengths=lengths)

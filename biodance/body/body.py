@@ -48,51 +48,6 @@ def load_pinocchio() -> Any:
     return pinocchio
 
 
-def build(
-    name: str,
-    joints: tuple[Joint, ...],
-    limits: JointLimits,
-    *,
-    inertias: tuple[tuple[int, Array], ...],
-    gravity: Array,
-    free: bool,
-) -> "pin.Model":
-    """Return a pinocchio model with ``joints`` in order, on a ``free`` root or on the ground; ``gravity`` (3,) m/s².
-
-    ``inertias``: of every segment the index of the joint that carries it (-1: the root) and its ten parameters.
-    """
-    pin = load_pinocchio()
-    model = pin.Model()
-    model.name = name
-    model.gravity.linear = np.array(gravity)
-    root = 0
-    if free:
-        root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
-    ids: list[int] = []
-    for i, joint in enumerate(joints):
-        parent = root if joint.parent < 0 else ids[joint.parent]
-        placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
-        effort = max(-limits.torque_lower[i], limits.torque_upper[i])
-        one = np.ones(1)
-        ids.append(
-            model.addJoint(
-                parent,
-                pin.JointModelRevoluteUnaligned(np.array(joint.axis)),
-                placement,
-                joint.name,
-                effort * one,
-                limits.velocity[i] * one,
-                limits.lower[i] * one,
-                limits.upper[i] * one,
-            )
-        )
-    for carrier, parameters in inertias:
-        # The ten parameters are about the joint, as Pinocchio's dynamic parameters are.
-        inertia = pin.Inertia.FromDynamicParameters(np.array(parameters))
-        model.appendBodyToJoint(root if carrier < 0 else ids[carrier], inertia, pin.SE3.Identity())
-    return model
-
-
 @dataclass(frozen=True, eq=False)
 class Body(JointTree, Sendable):
     """A person or robot as a tree of rigid segments.
@@ -260,14 +215,25 @@ class Body(JointTree, Sendable):
     @cached_property
     def model(self) -> "pin.Model":
         """Its pinocchio model; never written to. Joint ids are 2 + index in `joints` (1 + index for a fixed root)."""
-        return build(
-            self.name,
-            self.joints,
-            self.limits,
-            inertias=tuple(zip(self.segment_joint, self.link_parameters().reshape(-1, 10), strict=True)),
-            gravity=self.gravity,
-            free=bool(self.n_root),
-        )
+        pin, limits, one = load_pinocchio(), self.limits, np.ones(1)
+        model = pin.Model()
+        model.name = self.name
+        model.gravity.linear = np.array(self.gravity)
+        free, still = pin.JointModelFreeFlyer(), pin.SE3.Identity()
+        root = model.addJoint(0, free, still, "root") if self.n_root else 0
+        ids: list[int] = []
+        for i, joint in enumerate(self.joints):
+            parent = root if joint.parent < 0 else ids[joint.parent]
+            turning = pin.JointModelRevoluteUnaligned(np.array(joint.axis))
+            placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
+            effort = max(-limits.torque_lower[i], limits.torque_upper[i])
+            bounds = [value * one for value in (effort, limits.velocity[i], limits.lower[i], limits.upper[i])]
+            ids.append(model.addJoint(parent, turning, placement, joint.name, *bounds))
+        for carrier, parameters in zip(self.segment_joint, self.link_parameters().reshape(-1, 10), strict=True):
+            # The ten parameters are about the joint, as Pinocchio's dynamic parameters are.
+            inertia = pin.Inertia.FromDynamicParameters(np.array(parameters))
+            model.appendBodyToJoint(root if carrier < 0 else ids[carrier], inertia, still)
+        return model
 
 
 _VERSION = 1

@@ -23,9 +23,6 @@ _MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
 """Mesh files that are read, by the ending of their name."""
 ROUNDNESS = 4.0
 """Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
-_HEAD, _SHOULDER = 0.7, 0.3
-"""Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
-_HEAD_BREADTH, _HEAD_DEPTH = 0.68, 0.85  # Of the height of the head
 
 
 def box_solid(box: Array) -> "Trimesh":
@@ -44,7 +41,7 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
     """Return the boxes (2, 3) m that segments are drawn as, each with the index of its segment: one each, but trunk and
     head apart.
 
-    The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without
+    The head takes 0.7 of what is above the shoulders, in the proportions of a person (Winter 2009); segments without
     a box have none.
     """
     parts, alone = [], "head" not in body.segments
@@ -56,8 +53,10 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
             parts.append((index, _head_in(box, box[1, 1] - box[0, 1])))
         elif body.segments[index] == "trunk_head" and alone and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
             low = np.array(box)
-            low[1, 1] = np.mean(arms) + _SHOULDER * (box[1, 1] - np.mean(arms))
-            parts += [(index, low), (index, _head_in(box, _HEAD * (box[1, 1] - np.mean(arms))))]
+            # Of the height over the shoulders: how far the trunk reaches up, and the head down from the vertex.
+            above = box[1, 1] - np.mean(arms)
+            low[1, 1] = np.mean(arms) + 0.3 * above
+            parts += [(index, low), (index, _head_in(box, 0.7 * above))]
         else:
             parts.append((index, box))
     return parts
@@ -65,7 +64,7 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
 
 def _head_in(box: Array, height: float) -> Array:
     """Return the box (2, 3) m of a head of some ``height`` (m) at the top of a ``box``."""
-    middle, half = (box[0] + box[1]) / 2, height * np.array([_HEAD_DEPTH, 1.0, _HEAD_BREADTH]) / 2
+    middle, half = (box[0] + box[1]) / 2, height * np.array([0.85, 1.0, 0.68]) / 2
     head = np.stack([middle - half, middle + half])
     head[:, 1] = box[1, 1] - height, box[1, 1]
     return head

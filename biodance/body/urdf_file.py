@@ -267,10 +267,10 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
     origin = element.find("origin")
     if origin is None:
         return np.eye(3), np.zeros(3)
-    roll, pitch, yaw = _row(path, origin, "rpy", what, "0 0 0")
+    roll, pitch, yaw = _numbers(path, origin, "rpy", what, 3, "0 0 0")
     # rpy: about fixed x, y, z in this order, so Rz Ry Rx.
     turn = elementary_rotation("z", yaw) @ elementary_rotation("y", pitch) @ elementary_rotation("x", roll)
-    return turn, _row(path, origin, "xyz", what, "0 0 0")
+    return turn, _numbers(path, origin, "xyz", what, 3, "0 0 0")
 
 
 def _link(path: Path, element: Element) -> Link:
@@ -279,10 +279,9 @@ def _link(path: Path, element: Element) -> Link:
     lump, unread = _lump(path, element.find("inertial"), what), list[str]()
     lumps = () if lump is None else (lump,)
     for kind in ("collision", "visual"):
-        elements = element.findall(kind)
-        shapes, hulls = _shapes(path, elements, what), _mesh_hulls(path, elements, what, unread)
-        if shapes or hulls:
-            return Link(name, lumps, shapes, hulls)
+        boxes, hulls = _shapes(path, element.findall(kind), what, unread)
+        if boxes or hulls:
+            return Link(name, lumps, boxes, hulls)
     return Link(name, lumps, unread=tuple(unread))
 
 
@@ -305,42 +304,36 @@ def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | Non
     return RigidInertia(value, com, inertia) if value > 0 else None
 
 
-def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]:
-    """Return the corners (8, 3) of the boxes around all shapes that are not meshes."""
-    boxes = []
+def _shapes(
+    path: Path, elements: list[Element], what: str, unread: list[str]
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Return the corners (8, 3) m of the boxes around all shapes that are not meshes, and those (K, 3) m of the convex
+    hulls of all meshes; why one cannot be read goes to ``unread``.
+    """
+    boxes, hulls = [], []
     for element in elements:
-        geometry = element.find("geometry")
-        shape = next(iter(geometry), None) if geometry is not None else None
-        if shape is None or shape.tag == "mesh":
+        shape = element.find("geometry/*")
+        if shape is None:
+            continue
+        turn, place = placement(path, element, what)
+        if shape.tag == "mesh":
+            scale = _numbers(path, shape, "scale", what, 3, "1 1 1")
+            try:
+                hulls.append(_mesh_hull(mesh_file(path, shape.get("filename", "")), tuple(scale)) @ turn.T + place)
+            except FileRefused as error:
+                unread.append(str(error))
             continue
         if shape.tag == "box":
-            half = _row(path, shape, "size", what) / 2
+            half = _numbers(path, shape, "size", what, 3) / 2
         elif shape.tag in ("cylinder", "sphere"):
             radius = _number(path, shape, "radius", what)
             half = np.full(3, radius)
             half[2] = radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2
         else:
             raise FileRefused(f"{path}: {what} has the shape <{shape.tag}>; legal are box, cylinder, sphere and mesh.")
-        turn, place = placement(path, element, what)
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         boxes.append(signs * half @ turn.T + place)
-    return tuple(boxes)
-
-
-def _mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
-    """Return the corners (K, 3) m of the convex hulls of all meshes; why one cannot be read goes to ``unread``."""
-    hulls = []
-    for element in elements:
-        mesh = element.find("geometry/mesh")
-        if mesh is None:
-            continue
-        scale = _row(path, mesh, "scale", what, "1 1 1")
-        turn, place = placement(path, element, what)
-        try:
-            hulls.append(_mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
-        except FileRefused as error:
-            unread.append(str(error))
-    return tuple(hulls)
+    return tuple(boxes), tuple(hulls)
 
 
 def _connection(path: Path, element: Element, links: set[str]) -> Connection:
@@ -365,7 +358,7 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     if kind == "fixed":
         return fixed
     given = element.find("axis")
-    axis = _row(path, given, "xyz", what) if given is not None else _X
+    axis = _numbers(path, given, "xyz", what, 3) if given is not None else _X
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
         raise FileRefused(f"{path}: the axis of {what} has no direction ({axis}). Give xyz of an axis.")
@@ -408,24 +401,19 @@ def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, 
 
 
 def _number(path: Path, element: Element, key: str, what: str) -> float:
-    text = element.get(key)
+    return float(_numbers(path, element, key, what, 1)[0])
+
+
+def _numbers(path: Path, element: Element, key: str, what: str, count: int, default: str | None = None) -> Array:
+    """Return ``count`` finite numbers of an attribute (1 or 3)."""
+    text = element.get(key, default)
     if text is None:
         raise FileRefused(f"{path}: <{element.tag}> of {what} lacks {key}. Add it.")
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise FileRefused(f"{path}: {key} of <{element.tag}> of {what} is {text!r}; expected a finite number.")
-    return value
-
-
-def _row(path: Path, element: Element, key: str, what: str, default: str = "") -> Array:
-    text = element.get(key, default)
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.empty(0)
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise FileRefused(f"{path}: {key} of <{element.tag}> of {what} is {text!r}; expected three finite numbers.")
+    if values.shape != (count,) or not np.isfinite(values).all():
+        expected = "a finite number" if count == 1 else "three finite numbers"
+        raise FileRefused(f"{path}: {key} of <{element.tag}> of {what} is {text!r}; expected {expected}.")
     return values

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
+from biodance.lab.markers.sets import part_of
 from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.sources import joint_of
@@ -27,7 +27,7 @@ def marker_keys(problem: Problem) -> tuple[str, ...]:
     """Return the keys of the rows that follow those of the plates."""
     body = problem.cases[0].body
     wholes = (*range(len(body.segments)), *(part.segment for part in body.parts))
-    keys = tuple(f"marker {kind_of(body.segments[wholes[s]])}" for s in body.markers.segment for _ in range(3))
+    keys = tuple(f"marker {part_of(body.segments[wholes[s]])}" for s in body.markers.segment for _ in range(3))
     return keys + tuple(f"shown {name}" for name, _ in problem.shown)
 
 

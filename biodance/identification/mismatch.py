@@ -21,12 +21,12 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
-from biodance.body.human.skeleton import kind_of
 from biodance.body.parts import shift_matter
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.loads import PossibleTables, more_probable_table, with_room
 from biodance.identification.posterior import BodyPosterior, Information, find_posterior
 from biodance.identification.statistics import PAIRS, Fit, Statistics, learn_noise
+from biodance.lab.markers.sets import part_of
 from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Index, Motion, Sip
@@ -269,7 +269,7 @@ def undiluted(total: Statistics, phi: Array, known: Information, table: Sip) -> 
         whatever the gains: they act on what can be known of the parameters, so that no gain shows what no movement
         does.
     """
-    kinds = [kind_of(name) for name in table.segments]
+    kinds = [part_of(name) for name in table.segments]
     parts = np.repeat([[kind in part for kind in kinds] for part in _PARTS], 10, axis=1)
     learned, gram = _learned(known, table), np.array(total.gram)
     for band in np.flatnonzero((np.array(total.layout.bands.edges[:-1]) >= _FAST) & (total.count > 0)):

@@ -15,6 +15,7 @@ from biodance.body.parts import TENSOR, JointError, inertia_tensor
 from biodance.body.tables.anthropometry import read_segment_table
 from biodance.body.tables.choice import BASE, PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.lab.markers.sets import part_of
 from biodance.records import Array, Sip
 from biodance.spatial import skew
 
@@ -164,7 +165,7 @@ def _mass_spread(prior: Sip) -> Array:
     )
     # Only what lacks to the floor, in quadrature; what is held fixed, or has no mass, stays as it is.
     missing = np.sqrt(np.maximum(least**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
-    names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
+    names = [part_of(name) for name in prior.segments]
     sides = error_size("left_right_correlation", "mass")
     alike = np.array(
         [[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)]
@@ -182,7 +183,7 @@ def _mass_spread(prior: Sip) -> Array:
 @functools.cache
 def _averaged(segment: str) -> float:
     """Return how much less a segment of several parts may be off than one part: independent errors average."""
-    parts = PARTS.get(segment.removeprefix("right_").removeprefix("left_"), ())
+    parts = PARTS.get(part_of(segment), ())
     if len(parts) < 2:
         return 1.0
     mass = np.array([read_segment_table(BASE).value(part, "mass", sex="M") for part in parts])

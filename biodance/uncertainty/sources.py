@@ -17,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.skeleton import kind_of
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.errors import UnknownName
+from biodance.lab.markers.sets import part_of
 from biodance.motion.ik.compiled.tree import FOUR, add_products
 from biodance.motion.kinematics import Poses, below, chains, neighbours, poses
 from biodance.records import Array, Index, Motion
@@ -75,7 +75,7 @@ class Centre(_Carried):
     @cached_property
     def groups(self) -> tuple[str, ...]:
         """Three axes of every anatomical joint."""
-        return tuple(f"joint_centre {kind_of(name)}" for name in self.joints)
+        return tuple(f"joint_centre {part_of(name)}" for name in self.joints)
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -117,7 +117,7 @@ class Tilt(_Carried):
     @cached_property
     def groups(self) -> tuple[str, ...]:
         """Two directions of every hinge."""
-        return tuple(f"tilt {kind_of(name)}" for name in self.joints)
+        return tuple(f"tilt {part_of(name)}" for name in self.joints)
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ class Slide(_WithAngles):
         """Every pattern of a segment, times every angle beside it."""
         count = zip(self.body.segments, self.patterns, _near(self.body), strict=True)
         return tuple(
-            f"slide {kind_of(name)}" for name, pattern, near in count for _ in range(pattern.shape[2] * near.size)
+            f"slide {part_of(name)}" for name, pattern, near in count for _ in range(pattern.shape[2] * near.size)
         )
 
     def residual(self, trial: Response) -> Array:
@@ -282,7 +282,7 @@ class Sag(_Moved):
     @cached_property
     def groups(self) -> tuple[str, ...]:
         """Every segment that wears markers."""
-        return tuple(f"sag {kind_of(self.body.segments[s])}" for s in self._worn)
+        return tuple(f"sag {part_of(self.body.segments[s])}" for s in self._worn)
 
     @property
     def _worn(self) -> tuple[int, ...]:
@@ -314,7 +314,7 @@ class Flesh(_WithAngles):
     def groups(self) -> tuple[str, ...]:
         """Three axes of every segment, times every angle beside it."""
         pairs = zip(self.body.segments, _near(self.body), strict=True)
-        return tuple(f"flesh {kind_of(name)}" for name, near in pairs for _ in range(3 * near.size))
+        return tuple(f"flesh {part_of(name)}" for name, near in pairs for _ in range(3 * near.size))
 
     def residual(self, trial: Response) -> Array:
         """Return zeros: no marker sees a displaced centre of mass."""
@@ -370,7 +370,7 @@ def of_whole(group: str, body: Body) -> str:
     """Return a group of errors as that of the segment where it is one of a part: ``slide head`` -> ``slide
     trunk_head``.
     """
-    wholes = {kind_of(part.name): kind_of(body.segments[part.segment]) for part in body.parts}
+    wholes = {part_of(part.name): part_of(body.segments[part.segment]) for part in body.parts}
     quantity, _, target = group.partition(" ")
     return f"{quantity} {wholes.get(target, target)}"
 

@@ -17,21 +17,18 @@ from biodance.records import Array
 
 FORMAT = "csv"
 SUFFIX = ".csv"
-_HEADER = ("segment", "quantity", "value", "unit", "sd", "frame", "source")
 _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 STANDARD = ("mass", *(f"first_moment_{a}" for a in "xyz"), *(f"inertia_{t}" for t in _TENSOR))
 _DERIVED = (*(f"com_{a}" for a in "xyz"), *(f"central_inertia_{t}" for t in _TENSOR))
 _UNITS = ("kg", *["kg·m"] * 3, *["kg·m²"] * 6, *["m"] * 3, *["kg·m²"] * 6)
 """Of the standard, then of the derived quantities."""
-_JOINT_FRAME = "segment axes (x anterior, y up, z right), about the proximal joint centre"
-_COM_FRAME = "segment axes (x anterior, y up, z right), about the centre of mass"
 
 
 def text(body: Body, source: str) -> str:
     """Return the table of ``body.sip``."""
     stream = io.StringIO()
     write = csv.writer(stream, lineterminator="\n")
-    write.writerow(_HEADER)
+    write.writerow(("segment", "quantity", "value", "unit", "sd", "frame", "source"))
     sd = np.sqrt(np.diag(body.sip.covariance)).reshape(-1, 10)
     for i, name in enumerate(body.segments):
         phi, block = body.sip.of(name), slice(10 * i, 10 * i + 10)
@@ -42,7 +39,8 @@ def text(body: Body, source: str) -> str:
         spread = np.sqrt(np.maximum(np.diag(slope @ body.sip.covariance[block, block] @ slope.T), 0.0))
         numbers = (*phi, *_derived(phi)), (*sd[i], *spread)
         for quantity, unit, value, deviation in zip((*STANDARD, *_DERIVED), _UNITS, *numbers, strict=True):
-            frame = _COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else _JOINT_FRAME
+            about = "centre of mass" if quantity.startswith("central") else "proximal joint centre"
+            frame = f"segment axes (x anterior, y up, z right), about the {about}" if quantity != "mass" else ""
             row = [name, quantity, repr(float(value)), unit, repr(float(deviation)), frame, source]
             write.writerow([for_spreadsheet(row[0]), *row[1:]])
     return stream.getvalue()

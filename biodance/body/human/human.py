@@ -30,8 +30,6 @@ from biodance.body.human.skeleton import (
     generic_skeleton,
     joint_limits,
     joint_tree,
-    kind_of,
-    side_of,
     upright_to,
 )
 from biodance.body.parts import (
@@ -51,8 +49,8 @@ from biodance.body.tables.choice import lengths as reference_lengths
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.error_sizes import error_size
 from biodance.display import spaced
-from biodance.lab.markers.sets import MarkerSet, read_marker_set
-from biodance.records import SIDES, Array, Sip, Subject, grouped
+from biodance.lab.markers.sets import MarkerSet, part_of, read_marker_set
+from biodance.records import SIDES, Array, Sip, Subject, grouped, side_in_name
 from biodance.settings import STANDARD_GRAVITY, Settings
 
 _BOTH = (WOMAN, MAN)
@@ -220,7 +218,7 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     """
     lumps = []
     for segment in SEGMENTS:
-        kind = kind_of(segment)
+        kind = part_of(segment)
         unit, longer = reference.segments[kind], skeleton.stretched.get(segment, 1.0)
         scale, mass = skeleton.lengths[segment] / reference.lengths[kind], unit.mass * subject.mass
         lump = RigidInertia(mass, scale * unit.com, mass * scale**2 * unit.inertia)
@@ -235,7 +233,7 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
             ahead = usual - skeleton.heel_behind_ankle[segment.removesuffix("_foot")]
             lump = replace(lump, com=lump.com + np.array([ahead, 0.0, 0.0]))
         # The other body side is the mirror image at z = 0.
-        lumps.append(lump if side_of(segment) > 0 else turn_inertia(lump, np.diag([1.0, 1.0, -1.0])))
+        lumps.append(turn_inertia(lump, np.diag([1.0, 1.0, -1.0])) if segment.startswith("left") else lump)
     return tuple(lumps)
 
 
@@ -267,7 +265,7 @@ def primitive_covariance(
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
     variance = np.concatenate([_primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
-    floor = [least * lump.mass * (len(PARTS[kind_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
+    floor = [least * lump.mass * (len(PARTS[part_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
     variance[::10] = np.maximum(variance[::10], np.square(floor))
     # What the disagreement of the tables explains is no error of a segment's own; at least the share `own_share`.
     own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
@@ -276,7 +274,7 @@ def primitive_covariance(
         if segment.startswith("right_"):
             left = SEGMENTS.index(segment.replace("right_", "left_"))
             together[i, left] = together[left, i] = error_size("left_right_correlation", "mass")
-    scale = own * np.concatenate([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
+    scale = own * np.concatenate([MIRROR if s.startswith("left") else np.ones(10) for s in SEGMENTS])
     # Own errors, right and left correlated (mirrored axes change signs), plus one direction for each other table.
     covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale) + ways.T @ ways
     total = np.tile(np.eye(10)[0], len(SEGMENTS))
@@ -288,12 +286,12 @@ def primitive_covariance(
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
     """Return the standard deviations (3,) m of a segment's CoM in its frame: tables, people, misplaced joints."""
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
-    return np.hypot(_table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
+    return np.hypot(_table_spread(part_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
 def _primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
     """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of a segment about its joint."""
-    kind, own = _table_spread(kind_of(segment)), lump.inertia / lump.mass
+    kind, own = _table_spread(part_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))
     tensor = [
@@ -395,7 +393,7 @@ def assemble(
     measured = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
     skeleton = replace(skeleton, lengths={**skeleton.lengths, **measured})
     usual, corners = reference(table, subject), "x_min y_min z_min x_max y_max z_max"
-    rows = [row_numbers(read_table("human", "boxes").row(segment=kind_of(s)), corners) for s in SEGMENTS]
+    rows = [row_numbers(read_table("human", "boxes").row(segment=part_of(s)), corners) for s in SEGMENTS]
     boxes = np.array(rows).reshape(-1, 2, 3) * skeleton.stature
     # The box ends at the vertex, counted from this person's trunk joint instead of the lumbar one from which the
     # table measures the trunk: 0.112 m over the hips at 1.755 m (ANSUR II).
@@ -486,4 +484,4 @@ def normaliser(skeleton: Skeleton, name: str, segment: str) -> float:
     if name in sizes:
         return sizes[name]
     kind = name.removesuffix("_length").replace("forearm", "forearm_hand")
-    return skeleton.lengths[f"{'left' if side_of(segment) < 0 else 'right'}_{kind}"]
+    return skeleton.lengths[f"{side_in_name(segment, 'right')}_{kind}"]

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.human.scan import TO_NECK, ScannedBody, cut_scan, read_scan
-from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
+from biodance.body.human.skeleton import SEGMENTS, Skeleton
 from biodance.body.parts import TENSOR, RigidInertia
 from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table, row_numbers
 from biodance.body.tables.choice import PARTS, reference, studies, study_masses
 from biodance.body.tables.choice import parts as table_parts
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import SessionRefused
+from biodance.lab.markers.sets import part_of
 from biodance.lab.session.file import legal_girths, usual_girths
 from biodance.records import SIDES, Array, FootSizes, Subject
 
@@ -96,7 +97,7 @@ def _girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) 
     opinions = {segment: one for segment, one in every.items() if one.said}
     total = sum(one.mass for one in every.values())
     if abs(total / subject.mass - 1) > _CONTRADICTION:
-        table = {segment: reference.segments[kind_of(segment)].mass * subject.mass for segment in opinions}
+        table = {segment: reference.segments[part_of(segment)].mass * subject.mass for segment in opinions}
         over = {segment: one.mass - table[segment] for segment, one in opinions.items()}
         worst = max(over, key=lambda segment: abs(over[segment]))
         raise SessionRefused(
@@ -111,9 +112,9 @@ def _girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) 
 def _opinion(
     segment: str, reference: Reference, skeleton: Skeleton, subject: Subject, girths: Mapping[str, float]
 ) -> _SegmentOpinion:
-    kind, side = kind_of(segment), segment.removesuffix(kind_of(segment))
+    kind, side = part_of(segment), segment.removesuffix(part_of(segment))
     mine = {name: girths.get(f"{side}{name}", girths.get(name)) for name in usual_girths()}
-    person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
+    person = {part_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
     survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
     mean, mean_sd = _mean_fraction(kind, subject.sex)
     shape, survey_sd = (error_size("solid_mass", what) for what in ("trunk" if kind in _TRUNK else "limb", "survey"))
@@ -259,7 +260,7 @@ def told_by(opinions: tuple[Opinion, ...]) -> dict[str, tuple[str, ...]]:
 
 def _of_masses(opinions: Mapping[str, _SegmentOpinion]) -> Opinion:
     """Return opinions on masses; the sides err together: same tape, same shape of muscle."""
-    kinds = np.array([kind_of(segment) for segment in opinions])
+    kinds = np.array([part_of(segment) for segment in opinions])
     sds = np.array([one.mass_sd for one in opinions.values()])
     together = np.where(kinds[:, None] == kinds, error_size("left_right_correlation", "mass"), 0.0)
     np.fill_diagonal(together, 1.0)
@@ -295,7 +296,7 @@ def primitives_of(lump: RigidInertia) -> Array:
 
 def _mass_noise(mass: Array, body: ScannedBody) -> Array:
     """Return the covariance (12, 12) kg² of the masses of a scan."""
-    kinds = np.array([kind_of(name) for name in SEGMENTS])
+    kinds = np.array([part_of(name) for name in SEGMENTS])
     density = np.array([error_size("scan_density", "trunk" if kind in _TRUNK else "limb") for kind in kinds])
     # Density errs alike for segments of one kind.
     noise = np.where(kinds[:, None] == kinds, np.outer(density * mass, density * mass), 0.0)

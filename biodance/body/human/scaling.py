@@ -9,7 +9,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.human import assemble
 from biodance.body.human.measures import Measures, StaticPosture, harrington_hip, measures, pelvis_frame, standing, unit
-from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_limits, joint_tree, kind_of, widen_limits
+from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_limits, joint_tree, widen_limits
 from biodance.body.human.static_centres import (
     LIMB_ENDS,
     UP,
@@ -22,7 +22,7 @@ from biodance.body.parts import SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
 from biodance.body.tables.error_sizes import error_size
-from biodance.lab.markers.sets import usual_places
+from biodance.lab.markers.sets import part_of, usual_places
 from biodance.lab.markers.upright import OUTWARDS
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.records.attention import Doubt
@@ -311,7 +311,7 @@ def _static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measu
 def _turn(frames: SegmentFrames, parent: str, child: str) -> Array:
     """Return the constant part of parent_R_child: a hinge's varus about x, an ankle's torsion about y."""
     relative = frames.rotation[parent].T @ frames.rotation[child]
-    if kind_of(child) == "foot":
+    if part_of(child) == "foot":
         # Ry: R20 = -sin, R00 = cos.
         return elementary_rotation("y", np.arctan2(-relative[2, 0], relative[0, 0]))
     # R = Rz(flexion) Rx(varus): R21 = sin(varus), whatever the flexion.
@@ -381,7 +381,7 @@ def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[Doub
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
     for segment in SEGMENTS:
-        low, high = (ratio * subject.stature for ratio in _LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
+        low, high = (ratio * subject.stature for ratio in _LENGTH_RATIO.get(part_of(segment), (0.0, 1.0)))
         if not low < skeleton.lengths[segment] < high:
             notes.append(
                 Doubt(
@@ -394,7 +394,7 @@ def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[Doub
         other = segment.replace("right_", "left_")
         more = skeleton.lengths[segment] - skeleton.lengths[other]
         # Doubted beyond two standard deviations of the difference, as any size that is told.
-        if kind_of(segment) in LIMB_ENDS and abs(more) > 2.0 * centres.sides_sd(kind_of(segment)):
+        if part_of(segment) in LIMB_ENDS and abs(more) > 2.0 * centres.sides_sd(part_of(segment)):
             how = f"is {1e3 * abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
             fact = f"the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}"
             notes.append(Doubt(fact, "Check the markers.", about=(segment, other)))

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of, upright_to
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, upright_to
 from biodance.body.parts import RigidInertia, combine_inertias, turn_inertia
 from biodance.body.solids import read_mesh
 from biodance.body.tables.anthropometry import read_table
 from biodance.errors import FileRefused, SessionRefused
+from biodance.lab.markers.sets import part_of
+from biodance.lab.markers.upright import OUTWARDS
 from biodance.records import SIDES, Array
 
 if TYPE_CHECKING:
@@ -250,14 +252,14 @@ def cut_scan(scan: _Scan, skeleton: Skeleton) -> ScannedBody:
     surfaces = {}
     for name in SEGMENTS:
         # a cylinder of mass m = rho pi r² l gains dm/dr = 2 rho pi r l = 2 sqrt(pi m rho l)
-        part = {"pelvis": "lower_trunk", "trunk_head": "upper_trunk"}.get(name, kind_of(name))
+        part = {"pelvis": "lower_trunk", "trunk_head": "upper_trunk"}.get(name, part_of(name))
         surfaces[name] = 2.0 * float(np.sqrt(np.pi * lumps[name].mass * _density(part) * lengths[name]))
     return ScannedBody(lumps, cuts, surfaces)
 
 
 def _hip(scan: _Scan, skeleton: Skeleton, side: str) -> tuple[Array, Array]:
     """Return ankle and hip centre (3,) m of one leg, straight, over the place where the ankle stands."""
-    sign = side_of(f"{side}_thigh")
+    sign = OUTWARDS[side]
     leg = clip_surface(scan.triangles, np.zeros(3), np.array([0.0, 0.0, sign]))
     up = skeleton.ankle_height[side]
     section = cut_section(leg, np.array([0.0, up, 0.0]), _UP)
@@ -300,7 +302,7 @@ def _arm(
     scan: _Scan, rest: Array, skeleton: Skeleton, side: str, middle: Array
 ) -> tuple[Array, Array, _Section, _Section]:
     """Return the closed arm, the body without it, and its shoulder and elbow."""
-    sign = side_of(f"{side}_thigh")
+    sign = OUTWARDS[side]
     up = np.array([0.0, middle[1] + skeleton.lengths["trunk_head"], 0.0])
     centre = cut_section(scan.triangles, up, _UP).middle
     shoulder = np.array([centre[0], up[1], sign * abs(skeleton.origins[f"{side}_shoulder"][2])])

@@ -22,7 +22,7 @@ from biodance.body.tables.anthropometry import (
     read_table,
     row_numbers,
 )
-from biodance.lab.markers.sets import MARKED_SEGMENTS
+from biodance.lab.markers.sets import MARKED_SEGMENTS, part_of
 from biodance.records import SIDES, Array, Subject
 from biodance.settings import STANDARD_GRAVITY
 
@@ -33,16 +33,6 @@ JOINTS = (
     *("right_shoulder", "right_elbow", "left_shoulder", "left_elbow"),
 )
 """Anatomical joints; each is one to three ``Joint`` records named ``<joint>_<movement>``."""
-
-
-def kind_of(segment: str) -> str:
-    """Return the segment's name without its side: ``left_thigh`` -> ``thigh``."""
-    return segment.removeprefix("right_").removeprefix("left_")
-
-
-def side_of(segment: str) -> float:
-    """Return +1 for a right or midline segment, -1 for a left one (the sign of z)."""
-    return -1.0 if segment.startswith("left_") else 1.0
 
 
 def upright_to(point: Array) -> Array:
@@ -89,7 +79,7 @@ def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
         for joint, kind in (("knee", "thigh"), ("ankle", "shank"), ("elbow", "upper_arm")):
             origins[f"{side}_{joint}"] = np.array([0.0, -kinds[kind], 0.0])
     ankle = proportion("ankle_height", sex) * stature
-    lengths = {segment: kinds[kind_of(segment)] for segment in SEGMENTS}
+    lengths = {segment: kinds[part_of(segment)] for segment in SEGMENTS}
     heel = proportion("heel_behind_ankle", sex) * kinds["foot"]
     asis = proportion("asis_width", sex) * stature
     return Skeleton(lengths, origins, dict.fromkeys(SIDES, ankle), dict.fromkeys(SIDES, heel), asis, stature)
@@ -199,21 +189,13 @@ _HAND_TURN = np.radians(120.0)
 """rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a
 narrower limit makes the arm jump to the other set of angles that reaches the same hand (seen in a real walk).
 """
-_LOADED_ANKLE = np.radians(40.0)
-"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et
-al. 1998); the tables give the unloaded joint's 20 to 25 deg.
-"""
-_BEYOND = np.radians(25.0)
-"""rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
-in many places where the model has one joint, marker sets turn the axes, and skin slides.
-"""
 _SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
 def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside
     them, the shoulder turning as far as the hand does, the ankle bending as far as under load, and all but knees,
-    elbows and that turn by ``BEYOND`` more. The notes name what this posture changed.
+    elbows and that turn by 25 degrees more. The notes name what this posture changed.
 
     Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
     stands tilted.
@@ -226,12 +208,16 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     # A pelvis tilted forwards adds to hip flexion and takes from trunk flexion; ranges only grow.
     shift = tilt * (named("_hip_flexion") - named("trunk_flexion"))
     lower, upper = body.limits.lower + np.minimum(shift, 0.0), body.limits.upper + np.maximum(shift, 0.0)
-    upper = np.where(named("_ankle_dorsiflexion"), np.maximum(upper, _LOADED_ANKLE), upper)
+    # Under body weight with a bent knee, as on stairs and in squats, an ankle bends by 40 degrees (weight-bearing
+    # lunge, Bennell et al. 1998); the tables give the unloaded joint's 20 to 25.
+    upper = np.where(named("_ankle_dorsiflexion"), np.maximum(upper, np.radians(40.0)), upper)
     lower, upper = (
         np.where(named("_shoulder_rotation"), *pair) for pair in ((-_HAND_TURN, lower), (_HAND_TURN, upper))
     )
-    # Hinges do not go further, nor does the shoulder's turn, as wide as the hand's.
-    free = _BEYOND * (1.0 - named("_knee_flexion", "_elbow_flexion", "_shoulder_rotation"))
+    # How far a joint may pass the anatomical range of the one whose name it has: trunk and girdle bend in many places
+    # where the model has one joint, marker sets turn the axes, and skin slides. Hinges do not go further, nor does the
+    # shoulder's turn, as wide as the hand's.
+    free = np.radians(25.0) * (1.0 - named("_knee_flexion", "_elbow_flexion", "_shoulder_rotation"))
     lower, upper = lower - free, upper + free
     low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
@@ -262,11 +248,6 @@ def standing_tilt(q: Array) -> float:
     return -float(np.arcsin(Rotation.from_quat(q[3:7]).as_matrix()[2, 0]))
 
 
-_NECK = 0.41
-"""Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45
-women). Nodding is shared by all of the neck; about its base the head's weight would move twice as far as it does in
-virtual persons.
-"""
 OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
 
@@ -305,7 +286,9 @@ def neck_and_vertex(body: Body) -> tuple[Array, Array] | None:
     if middle is None:
         return None
     vertex = np.array([middle[0], body.boxes[body.segment_index("trunk_head"), 1, 1], 0.0])
-    return middle + _NECK * (vertex - middle), vertex
+    # The head turns about the height of the angle of the jaw (de Leva 1996: 0.39 men, 0.45 women). Nodding is shared by
+    # all of the neck; about its base the head's weight would move twice as far as it does in virtual persons.
+    return middle + 0.41 * (vertex - middle), vertex
 
 
 def collar_bone(body: Body, side: str, markers: tuple[str, ...] = ()) -> Cut:
@@ -405,7 +388,7 @@ def _ranged(body: Body) -> Body:
     rows = {row["joint"]: row for row in read_table("human", "optional_joints").rows}
     lower, upper, joints = np.array(body.limits.lower), np.array(body.limits.upper), list[Joint]()
     for i, joint in enumerate(body.joints):
-        row = rows.get(kind_of(joint.name))
+        row = rows.get(part_of(joint.name))
         if row is not None:
             upper[i] = np.radians(float(row["range_deg"]))
             lower[i] = -upper[i]
@@ -423,7 +406,7 @@ def marker_groups(body: Body) -> tuple[str, ...]:
     neck = np.inf if places is None else float(places[0][1])
     groups = []
     for segment, height in zip(body.markers.segment, body.markers.position[:, 1], strict=True):
-        kind = kind_of(body.links[segment])
+        kind = part_of(body.links[segment])
         head = kind == "head" or (kind == "trunk_head" and height > neck)
         trunk, arms = kind in ("trunk_head", "clavicle"), kind in ("upper_arm", "forearm_hand", "hand")
         groups.append("head" if head else "arms" if arms else "trunk" if trunk else "legs")

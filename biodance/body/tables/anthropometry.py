@@ -135,14 +135,16 @@ def refuse_changed(path: Path, sha256: str) -> None:
 FAMILY = DataFamily("table of segment inertial parameters", "biodance.segment_tables", "anthropometry/segments", ".csv")
 _REQUIRED = ("segment", "sex", "quantity", "axis", "value", "unit")
 _OPTIONAL = ("study", "group", "per_kg", "per_m", "sd", "n", "correlation", "landmarks")
-_SEXES = ("F", "M", "FM")
-_ALONG = ("sagittal", "transverse", "longitudinal")
 _TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
+_ALONG = ("sagittal", "transverse", "longitudinal")
 _LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "mass": (("",), ("body_mass", "kg")),
     "length": (("",), ("m", "stature")),
     "com": (("longitudinal", "x", "y", "z"), ("length", "m")),
-    "gyration": ((*_ALONG, "transverse_proximal", "x", "y", "z", *_TENSOR), ("length", "m")),
+    "gyration": (
+        (*_ALONG, "transverse_proximal", "x", "y", "z", *_TENSOR),
+        ("length", "m"),
+    ),
     "inertia": (_ALONG, ("kg m2",)),
 }
 """The legal axes and units of every quantity; a unit such as ``length`` means a fraction of it."""
@@ -288,7 +290,7 @@ def _refuse_illegal(path: Path, line: int, row: Mapping[str, str]) -> None:
     quantity = row["quantity"]
     axes, units = _LEGAL.get(quantity, ((row["axis"],), (row["unit"],)))
     for column, what, legal in (
-        ("sex", "sex", _SEXES),
+        ("sex", "sex", ("F", "M", "FM")),
         ("quantity", "quantity", tuple(_LEGAL)),
         ("axis", f"axis of {quantity}", axes),
         ("unit", f"unit of {quantity}", units),

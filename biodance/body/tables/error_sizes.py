@@ -4,6 +4,7 @@ import functools
 
 from biodance.body.tables.anthropometry import TableRow, read_table
 from biodance.errors import UnknownName
+from biodance.lab.markers.sets import part_of
 
 
 def error_rows(*, whose: str = "believed") -> tuple[TableRow, ...]:
@@ -31,6 +32,6 @@ def joint_size(quantity: str, joint: str, *, state: str = "before") -> float:
     functional calibration, or of a ``state`` of its own; of a joint that the table does not name that of "other" ones.
     """
     try:
-        return error_size(quantity, joint.removeprefix("right_").removeprefix("left_"), state=state)
+        return error_size(quantity, part_of(joint), state=state)
     except UnknownName:
         return error_size(quantity, "other", state=state)

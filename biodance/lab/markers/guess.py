@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from biodance.display import spaced
 from biodance.lab.markers import upright
 from biodance.lab.markers.names import (
     Meaning,
@@ -300,13 +301,6 @@ class _PersonLabels:
         return may
 
 
-_FROM_VIDEO = (
-    "These labels are joints, as software estimates them from video, not markers on the skin: {named}. A body is "
-    "placed by markers on both iliac spines, at the side of knees and ankles, on heels and toes. Give positions of "
-    "markers, for example the augmented markers (.trc) of the same software."
-)
-
-
 @dataclass(frozen=True, eq=False)
 class _GuessedSet:
     """What was guessed: ``map`` label -> landmark or segment, "" ``name`` where it is not believed; ``doubts`` why
@@ -326,7 +320,12 @@ def guess_set(markers: Markers) -> _GuessedSet:
     at = upright.median_places(markers, upright.posture_frames(markers)[0])
     found = _guessed(at)
     joints = () if found.name else joints_from_video(at)
-    return replace(found, doubts=(_FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
+    said = (
+        "These labels are joints, as software estimates them from video, not markers on the skin: "
+        f"{', '.join(joints)}. A body is placed by markers on both iliac spines, at the side of knees and ankles, on "
+        "heels and toes. Give positions of markers, for example the augmented markers (.trc) of the same software."
+    )
+    return replace(found, doubts=(said, *found.doubts)) if joints else found
 
 
 def _guessed(at: Mapping[str, Array]) -> _GuessedSet:
@@ -352,16 +351,12 @@ def _guessed(at: Mapping[str, Array]) -> _GuessedSet:
     return stood if stood.name or len(stood.map) > len(named.map) else named
 
 
-def _words(place: str) -> str:
-    return place.replace("_", " ")
-
-
 def _guess_of(person: _PersonLabels) -> _GuessedSet:
     """Return the guess: the assignment, if it has what a body needs and the person confirms what the labels name."""
     places = person.assignment()
     doubts = [*_contradictions(person, places), *_inferences(person, places)]
     absent = [
-        f"{side} {_words(part)}"
+        f"{side} {spaced(part)}"
         for side in SIDES
         for part, others in _NEEDS.items()
         if not any(f"{side}_{one}" in places for one in others)
@@ -388,7 +383,7 @@ def _contradictions(person: _PersonLabels, places: Mapping[str, str]) -> Iterato
     landmarks = {label: place for place, label in places.items()}
     for place, label in person.named.items():
         if label not in landmarks and not person.confirmed[label]:
-            yield f"{label} was not taken for the {_words(place)}: no standing person has it there."
+            yield f"{label} was not taken for the {spaced(place)}: no standing person has it there."
     for place, label in places.items():
         if place in (one.place for one in person.confirmed[label]) or not person.is_named(place, label):
             continue
@@ -397,15 +392,15 @@ def _contradictions(person: _PersonLabels, places: Mapping[str, str]) -> Iterato
         if said == other_side(place) and other:
             if side == "right":
                 yield (
-                    f"{label} and {other} lie on each other's sides: taken for the {_words(part_of(place))} of the "
+                    f"{label} and {other} lie on each other's sides: taken for the {spaced(part_of(place))} of the "
                     f"side where they are."
                 )
         elif not other:
-            yield f"{label} is the only marker there: taken for the {_words(place)}, against its name."
+            yield f"{label} is the only marker there: taken for the {spaced(place)}, against its name."
         elif place.endswith("lateral"):
             yield (
                 f"{label} lies outside {other}, so it was taken for the lateral marker of the "
-                f"{_words(joint)}, against its name."
+                f"{spaced(joint)}, against its name."
             )
 
 
@@ -417,13 +412,13 @@ def _inferences(person: _PersonLabels, places: Mapping[str, str]) -> Iterator[st
         mirror = places.get(other_side(place))
         if place.endswith("lateral") and inner not in (label, *mute.values()):
             yield (
-                f"{label} lies across the {_words(place.rpartition('_')[0])} from {inner}, outside: it was taken for "
+                f"{label} lies across the {spaced(place.rpartition('_')[0])} from {inner}, outside: it was taken for "
                 f"the lateral marker, {inner} for the medial one."
             )
         elif mirror and mirror not in mute.values():
-            yield f"{label} lies where the mirror image of {mirror} is: taken for the {_words(place)}."
+            yield f"{label} lies where the mirror image of {mirror} is: taken for the {spaced(place)}."
         else:
-            yield f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
+            yield f"{label} stands where people have the {spaced(place)}, and no other marker does: taken for it."
 
 
 def _segments(person: _PersonLabels, taken: Collection[str]) -> dict[str, str]:

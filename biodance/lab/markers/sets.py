@@ -50,7 +50,6 @@ _NORMALISERS = "asis_width foot_length thigh_length shank_length upper_arm_lengt
 """Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid
 hip for the trunk.
 """
-_MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
 _FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
 
 
@@ -200,7 +199,7 @@ def segment_of(landmark: str) -> str:
 
 
 def part_of(landmark: str) -> str:
-    """Return a landmark without its side."""
+    """Return a landmark, segment or joint without its side: ``left_thigh`` -> ``thigh``."""
     return landmark.partition("_")[2] if landmark.startswith(SIDES) else landmark
 
 
@@ -247,16 +246,12 @@ def _marker(path: Path, label: str, fields: Any) -> _SetMarker:
     where = f"{path}: marker {label}"
     if not isinstance(fields, dict) or "segment" not in fields:
         raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(MARKED_SEGMENTS)}.")
-    words = {"segment": MARKED_SEGMENTS, "normaliser": _NORMALISERS.split(), "origin": ("segment", "mid_shoulder")}
-    for key, legal in words.items():
-        if key in fields and fields[key] not in legal:
-            raise BiodanceError(f"{where} has the {key} {fields[key]!r}. Legal: {', '.join(legal)}.")
-    unknown = [key for key in fields if key not in _MARKER_KEYS]
-    if unknown:
-        raise BiodanceError(f"{where} has the unknown key {unknown[0]!r}. Legal: {', '.join(_MARKER_KEYS)}.")
-    for key, (legal_value, expected) in _MARKER_VALUES.items():
-        if key in fields and not legal_value(fields[key]):
-            raise BiodanceError(f"{where} has the {key} {fields[key]!r}, expected {expected}.")
+    for key, value in fields.items():
+        if key not in _MARKER_KEYS:
+            raise BiodanceError(f"{where} has the unknown key {key!r}. Legal: {', '.join(_MARKER_KEYS)}.")
+        is_legal, expected = _MARKER_KEYS[key]
+        if not is_legal(value):
+            raise BiodanceError(f"{where} has the {key} {value!r}, expected {expected}.")
     if ("offset" in fields) != ("normaliser" in fields):
         raise BiodanceError(
             f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither."
@@ -277,15 +272,22 @@ def _three(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 3
 
 
-_MARKER_VALUES: dict[str, tuple[Callable[[Any], bool], str]] = {
+def _one_of(*words: str) -> tuple[Callable[[Any], bool], str]:
+    return words.__contains__, f"one of {', '.join(words)}"
+
+
+_MARKER_KEYS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "segment": _one_of(*MARKED_SEGMENTS),
     "weight": (lambda value: _number(value) and value >= 0, "a number >= 0"),
-    "corner_of": (_three, "the three labels of an alignment device"),
     "offset": (
         lambda value: _three(value) and all(map(_number, value)),
         "three numbers [x, y, z] (anterior, up, right)",
     ),
+    "normaliser": _one_of(*_NORMALISERS.split()),
+    "origin": _one_of("segment", "mid_shoulder"),
+    "corner_of": (_three, "the three labels of an alignment device"),
 }
-"""What the entries of a marker that are no words must be, and how that is said."""
+"""What the entries of a marker must be, and how that is said."""
 
 
 FOLDER = "anthropometry/marker_sets"

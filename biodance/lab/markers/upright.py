@@ -32,18 +32,10 @@ def movement(markers: Markers) -> float:
     as movement. NaN if no marker was ever seen.
     """
     if markers not in _MOVEMENT:
-        seen = np.sort(markers.xyz[:, markers.seen.any(axis=0)], axis=0)  # what was not seen comes last
-        low, high = (_at_share(seen, share) for share in (0.02, 0.98)) if seen.size else np.full((2, 1, 3), np.nan)
+        seen = markers.xyz[:, markers.seen.any(axis=0)]
+        low, high = np.nanquantile(seen, [0.02, 0.98], axis=0) if seen.size else np.full((2, 1, 3), np.nan)
         _MOVEMENT[markers] = float(np.median(np.linalg.norm(high - low, axis=1)))
     return _MOVEMENT[markers]
-
-
-def _at_share(ordered: Array, share: float) -> Array:
-    """Return the quantile (K, 3) of values (T, K, 3) in order, NaN last, by straight lines between them."""
-    last = np.isfinite(ordered).sum(axis=0) - 1
-    below = (share * last).astype(int)
-    low, high = (np.take_along_axis(ordered, np.minimum(k, last)[None], axis=0)[0] for k in (below, below + 1))
-    return np.asarray(low + (share * last - below) * (high - low))
 
 
 def is_still(trial: Trial) -> bool:

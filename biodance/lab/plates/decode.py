@@ -97,7 +97,7 @@ def decode_plate(raw: RawC3d, plate: PlateParameters, metres: float, turn: Array
     """Return the reading of one plate; TrialRefused where corners or ORIGIN make no sense, or no sample is known."""
     kind = PLATE_TYPES[plate.type]
     corners, corners_said = corners_in_lab(plate.corners, metres=metres, turn=turn)
-    half = half_sides(corners)
+    half = np.linalg.norm(_along_sides(corners), axis=1) / 4  # of twice the mean sides
     origin, origin_said = _origin(plate, half, metres)
 
     def in_si(samples: Array) -> Array:
@@ -376,12 +376,6 @@ def _along_sides(corners: Array) -> Array:
     """Return (2, 3) m twice the mean opposite sides, along the plate's x and y."""
     a, b, c, d = corners
     return np.array([a + d - b - c, a + b - c - d])
-
-
-def half_sides(corners: Array) -> Array:
-    """Return half the side lengths (2,) m along the plate's x and y."""
-    # Twice the mean side, and half of that: a quarter.
-    return np.linalg.norm(_along_sides(corners), axis=1) / 4
 
 
 def around_pressures(points: Array, height: float) -> Array:

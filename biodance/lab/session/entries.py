@@ -222,36 +222,29 @@ def within(time: Array, start: float, end: float) -> Mask:
     return (time >= start) & (time <= end)
 
 
-_LIMBS = tuple(name for name in MARKED_SEGMENTS if name.startswith(("right_", "left_")))
-_HEAVIEST = 30.0
-"""kg that a device may weigh: more is in grams, or no device."""
+def refuse_prosthesis(segment: str | None) -> None:
+    """Refuse the ``segment`` that a prosthesis begins with where it is none of an arm or leg (SessionRefused)."""
+    limbs = [name for name in MARKED_SEGMENTS if name.startswith(SIDES)]
+    if segment and segment not in limbs:
+        told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", segment, limbs)
+        raise SessionRefused(f"prosthesis: {told}")
 
 
-def refuse_worn(prosthesis: str | None, devices: Mapping[str, float]) -> None:
-    """Refuse the segment that a prosthesis begins with, and what is worn in kg by segment, where they are not legal.
-
-    Raises
-    ------
-    SessionRefused
-        A prosthesis begins with no segment of an arm or leg, there is no such segment to wear something on, or the mass
-        is none of a device.
+def refuse_devices(devices: Mapping[str, float]) -> None:
+    """Refuse what is worn, kg by segment, where there is no such segment, or the mass is none of a device
+    (SessionRefused).
     """
-    if prosthesis and prosthesis not in _LIMBS:
-        told = UnknownName.of("segment of an arm or leg, below whose joint the prosthesis is", prosthesis, _LIMBS)
-        raise SessionRefused(f"[subject] prosthesis: {told}")
     for segment, mass in devices.items():
         if segment not in MARKED_SEGMENTS:
             raise SessionRefused(f"[devices] {UnknownName.of('segment', segment, MARKED_SEGMENTS)}")
-        if not 0 < mass <= _HEAVIEST:
-            raise SessionRefused(
-                f"[devices] {segment} = {mass:g} kg is no device. Legal: above 0 and at most {_HEAVIEST:g} kg."
-            )
+        if not 0 < mass <= 30.0:  # more is in grams
+            raise SessionRefused(f"[devices] {segment} = {mass:g} kg is no device. Legal: above 0 and at most 30 kg.")
 
 
 class PlateEntry(BaseModel):
     """One table ``[plates.NAME]``; None = not said. `told_plate` checks the numbers."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
     corners_m: Any = None
     type: Any = None
@@ -259,7 +252,9 @@ class PlateEntry(BaseModel):
     sensitivity: Any = None
     origin_m: Any = None
     foot: Literal["left", "right"] | None = None
+    """Write "left" or "right"; leave it out where both stand on the plate."""
     use: bool | None = None
+    """Write false to leave the plate out."""
 
 
 def told_plate(name: str, entry: PlateEntry) -> ToldPlate:

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from biodance.errors import BiodanceError, SessionRefused, did_you_mean
 from biodance.lab.markers.sets import parse_map
@@ -30,7 +30,8 @@ from biodance.lab.session.entries import (
     legal_events,
     legal_exchanges,
     legal_spans,
-    refuse_worn,
+    refuse_devices,
+    refuse_prosthesis,
     told_plate,
 )
 from biodance.library import locate, parse_toml, read_toml
@@ -177,31 +178,57 @@ FILES = ("subject.toml", "session.toml")
 
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
 
 class SubjectEntry(_Entry):
-    """The table ``[subject]``; None = not said. The bounds catch grams, millimetres and centimetres."""
+    """The table ``[subject]``; None = not said. The bounds catch grams, millimetres and centimetres. Validated with the
+    folder of its file as context, the files it names become paths from where we stand.
+    """
 
     mass_kg: Annotated[float, Field(ge=5, le=400)] | None = None
+    """Give the body mass in kg."""
     height_m: Annotated[float, Field(ge=0.4, le=2.6)] | None = None
+    """Give the stature in m."""
     sex: Literal["F", "M"] | None = None
+    """Write "F" or "M"."""
     age: Annotated[float, Field(ge=0, le=120)] | None = None
+    """Give the age in years."""
     name: str | None = None
     girths_cm: dict[str, float] | None = None
+    """Write {thigh = 54, right_shank = 37}, in cm."""
     scan: str | None = None
+    """Write the path of a mesh, for example "body.obj"."""
     scan_up: Literal["z", "y", "x"] | None = None
+    """Write the axis of the scan that points up: "z", "y" or "x"."""
     foot_outline: str | dict[str, float] | None = None
+    """Write {length = 26, breadth = 10, heel_breadth = 7} in cm, or the path of a CSV file."""
     prosthesis: str | None = None
+    """Write the segment that it begins with, for example "left_shank"."""
+
+    @field_validator("scan", "foot_outline")
+    @classmethod
+    def _beside(cls, said: object, info: ValidationInfo) -> object:
+        """Return the path of a file that lies beside session.toml; anything else as it is."""
+        return str(info.context / said) if isinstance(said, str) and info.context else said
+
+    @model_validator(mode="after")
+    def _possible(self) -> "SubjectEntry":
+        """Refuse what no person has, and a scan that is not there."""
+        _ = self.girths, self.outlines
+        refuse_prosthesis(self.prosthesis)
+        if self.scan is not None and not os.path.isfile(self.scan):
+            raise SessionRefused(f"scan: there is no file {self.scan}. Check the path, relative to session.toml.")
+        return self
 
     @property
     def girths(self) -> dict[str, float]:
-        """Girths in m by name, checked when the file was read."""
+        """Girths in m by name."""
         return legal_girths({name: value / 100 for name, value in (self.girths_cm or {}).items()})
 
     @property
     def outlines(self) -> dict[str, FootSizes]:
-        """Outlines of the feet by side, checked when the file was read."""
+        """Outlines of the feet by side."""
         if isinstance(self.foot_outline, str):
             return traced_outline(self.foot_outline)
         return typed_outline({name: value / 100 for name, value in (self.foot_outline or {}).items()})
@@ -211,9 +238,18 @@ class _TrialEntry(_Entry):
     """One table ``[trials.NAME]``."""
 
     role: Role | None = None
+    """Legal are static, fit, validate, check, skip."""
     exchange: list[list[str | float]] | None = None
+    """Write [["LKNE", "RKNE"]], or with from and to in s: [["LKNE", "RKNE", 1.2, 3.4]]."""
     leave_out: list[list[float | str]] | None = None
+    """Write spans from and to in s: [[2.5, 3.1]], or of one foot: [[2.5, 3.1, "right"]]."""
     events: list[dict[str, float | str]] | None = None
+    """Write [{side = "left", kind = "strike", time = 1.23}, ...]."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> "_TrialEntry":
+        _ = legal_exchanges(self.exchange), legal_spans(self.leave_out), legal_events(self.events)
+        return self
 
 
 class _MarkersEntry(_Entry):
@@ -222,8 +258,11 @@ class _MarkersEntry(_Entry):
     """
 
     file: str | None = None
+    """Write the path of a marker set, for example "my_set.toml"."""
     map: dict[str, str] | None = None
+    """Write {LABEL = "left_asis", ...}."""
     drop: list[str] | None = None
+    """Write the labels, for example ["T10", "RBAK"]."""
 
 
 class VisitEntry(_Entry):
@@ -243,6 +282,12 @@ class _Contents(_Entry):
     plates: dict[str, PlateEntry] = {}
     devices: dict[str, float] = {}
     settings: dict[str, Any] = {}
+
+    @model_validator(mode="after")
+    def _possible(self) -> "_Contents":
+        _ = [told_plate(name, entry) for name, entry in self.plates.items()]
+        refuse_devices(self.devices)
+        return self
 
 
 @dataclass(frozen=True)
@@ -375,30 +420,9 @@ def _marker_set(path: Path, said: _MarkersEntry) -> str:
 
 def _checked(path: Path, raw: dict[str, Any]) -> _Contents:
     try:
-        found = _beside(path, _Contents.model_validate(_whole_numbers_are_numbers(raw)))
-        _ = found.subject.girths, found.subject.outlines
-    except SessionRefused as error:
-        raise SessionRefused(f"{path}: [subject] {error}") from None
+        return _Contents.model_validate(_whole_numbers_are_numbers(raw), context=path.parent)
     except ValidationError as error:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
-    try:
-        _ = [told_plate(name, entry) for name, entry in found.plates.items()]
-        refuse_worn(found.subject.prosthesis, found.devices)
-        for one in found.trials.values():
-            _ = legal_exchanges(one.exchange), legal_spans(one.leave_out), legal_events(one.events)
-    except SessionRefused as error:
-        raise SessionRefused(f"{path}: {error}") from None
-    return found
-
-
-def _beside(path: Path, found: _Contents) -> _Contents:
-    """Return the contents with the files that the subject's table names as paths from where we stand."""
-    subject = found.subject
-    files = {"scan": subject.scan, "foot_outline": subject.foot_outline}
-    placed = {name: str(path.parent / said) for name, said in files.items() if isinstance(said, str)}
-    if subject.scan is not None and not os.path.isfile(placed["scan"]):
-        raise SessionRefused(f"scan: there is no file {placed['scan']}. Check the path, relative to {path.name}.")
-    return found.model_copy(update={"subject": subject.model_copy(update=placed)})
 
 
 def _whole_numbers_are_numbers(raw: Any) -> Any:
@@ -410,40 +434,18 @@ def _whole_numbers_are_numbers(raw: Any) -> Any:
 
 def _sentence(path: Path, fault: Any) -> str:
     """Return one fault that pydantic found as a sentence for the analyst."""
-    *table, key = (str(part) for part in fault["loc"]) if fault["loc"] else ("",)
+    loc = [str(part) for part in fault["loc"]]
+    if fault["type"] == "value_error":  # a check of our own
+        at = f"[{'.'.join(loc)}] " if loc else ""
+        return f"{path}: {at}{fault['ctx']['error']}"
+    *table, key = loc or [""]
     where = f"[{'.'.join(table)}]" if table else "the top level"
+    # What the table holds: the fields of its model, or of the model of its entries by name.
+    kind = _Contents.model_fields[table[0]].annotation if table else _Contents
+    fields = getattr((kind, *get_args(kind))[-1], "model_fields", {})
     if fault["type"] == "extra_forbidden":
-        legal = list(_TABLES.get(table[0] if table else "", _Contents).model_fields)
-        hint = did_you_mean(key, legal, cutoff=0.3)
-        return f"{path}: {where} has the unknown key {key!r}.{hint} Legal: {', '.join(legal)}."
+        hint = did_you_mean(key, list(fields), cutoff=0.3)
+        return f"{path}: {where} has the unknown key {key!r}.{hint} Legal: {', '.join(fields)}."
     wrong = f"{path}: {key} = {fault['input']!r} in {where} is not legal: {fault['msg'][0].lower()}{fault['msg'][1:]}."
-    return f"{wrong} {_HELP.get(key, '')}".rstrip()
-
-
-_TABLES: dict[str, type[BaseModel]] = {
-    "session": VisitEntry,
-    "subject": SubjectEntry,
-    "trials": _TrialEntry,
-    "markers": _MarkersEntry,
-    "plates": PlateEntry,
-}
-_HELP = {
-    "mass_kg": "Give the body mass in kg.",
-    "height_m": "Give the stature in m.",
-    "sex": 'Write "F" or "M".',
-    "age": "Give the age in years.",
-    "girths_cm": "Write {thigh = 54, right_shank = 37}, in cm.",
-    "scan": 'Write the path of a mesh, for example "body.obj".',
-    "scan_up": 'Write the axis of the scan that points up: "z", "y" or "x".',
-    "prosthesis": 'Write the segment that it begins with, for example "left_shank".',
-    "foot_outline": "Write {length = 26, breadth = 10, heel_breadth = 7} in cm, or the path of a CSV file.",
-    "file": 'Write the path of a marker set, for example "my_set.toml".',
-    "map": 'Write {LABEL = "left_asis", ...}.',
-    "foot": 'Write "left" or "right"; leave it out where both stand on the plate.',
-    "use": "Write false to leave the plate out.",
-    "role": f"Legal are {', '.join(get_args(Role))}.",
-    "drop": 'Write the labels, for example ["T10", "RBAK"].',
-    "exchange": 'Write [["LKNE", "RKNE"]], or with from and to in s: [["LKNE", "RKNE", 1.2, 3.4]].',
-    "events": 'Write [{side = "left", kind = "strike", time = 1.23}, ...].',
-    "leave_out": 'Write spans from and to in s: [[2.5, 3.1]], or of one foot: [[2.5, 3.1, "right"]].',
-}
+    cures = (fields[part].description for part in reversed(loc) if part in fields)
+    return f"{wrong} {next(cures, None) or ''}".rstrip()

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -109,7 +108,6 @@ def _mean(at: Mapping[str, Array], landmarks: tuple[str, ...]) -> Array:
     return np.mean([at.get(name, np.full(3, np.nan)) for name in landmarks], axis=0)
 
 
-NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
 _DECLARED = {
     "mass": (("bodymass", "mass_kg", "mass", "weight"), (5.0, 400.0)),
     "stature": (("height", "stature", "height_m", "bodyheight"), (0.4, 2.6)),

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
-from biodance.body.human.skeleton import JOINTS, OPTIONAL_JOINTS, kind_of, with_optional
+from biodance.body.human.skeleton import JOINTS, OPTIONAL_JOINTS, with_optional
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
+from biodance.lab.markers.sets import part_of
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
@@ -376,7 +377,7 @@ def with_shown_joints(
 def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need: float) -> list[tuple[Body, JointGain]]:
     """Return the body with one joint more and what it brings; nothing where no markers can show it, or none asks."""
     worn = zip(more.markers.names, more.markers.segment, strict=True)
-    told = [one for one, s in worn if one in some.markers and kind_of(more.links[s]) in _TELLING[name]]
+    told = [one for one, s in worn if one in some.markers and part_of(more.links[s]) in _TELLING[name]]
     if before is None or not told:
         return []
     fitted, without = before.distances(told, some.trial)
