@@ -15,8 +15,8 @@ from biodance.body.body import Body
 from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_interval, known_together
-from biodance.identification.loads import more_probable_table, possible_tables, unknown_loads, with_room
-from biodance.identification.mismatch import Mismatch, Sizes, discounted, mismatch, softness, undo_dilution
+from biodance.identification.loads import PossibleTables, more_probable_table, possible_tables, unknown_loads, with_room
+from biodance.identification.mismatch import Calibrated, Mismatch, Sizes, discounted, mismatch, softness, undo_dilution
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.posterior import BodyPosterior, Information, find_posterior
 from biodance.identification.statistics import Fit, Statistics, learn_noise, statistics, usable
@@ -225,17 +225,19 @@ def conclude_trials(
     Where movement is so slow that what its fastest band shows cannot be told from noise in the kinematics (regression
     dilution that cannot be given back, `dilution.gains_move_masses`), that band is left out.
     """
-    room = with_room(prior or widened_prior(body.sip, body.joint_errors), unknown_loads(body))
-    softer = softness(body, fits, total.layout.bands)
+    before, loads = prior or widened_prior(body.sip, body.joint_errors), unknown_loads(body)
+    tables = possible_tables(before, body) if prior is None else {(False, False): before}
+    room, softer = with_room(before, loads), softness(body, fits, total.layout.bands)
 
-    def concluded(some: Statistics) -> Identification:
-        noise, names = learn_noise(some, room), tuple(fit.name for fit in fits)
-        return conclude(body, some, names, noise=noise, found=mismatch(body, fits, noise, softer=softer), prior=prior)
+    def calibrated(some: Statistics) -> Calibrated:
+        noise = learn_noise(some, room)
+        found = mismatch(body, fits, noise, softer=softer)
+        return undo_dilution(body, some, discounted(some, noise, found, room), found, tables, room, loads)
 
-    found = concluded(total)
-    if not found.diluted:
-        return found
-    slower = concluded(total.slower())
+    got, names = calibrated(total), tuple(fit.name for fit in fits)
+    if not got.diluted:
+        return _concluded(body, got, tables, names)
+    slower = _concluded(body, calibrated(total.slower()), tables, names)
     return replace(slower, notes=(*slower.notes, _TOO_SLOW.format(total.layout.bands.edges[-2])))
 
 
@@ -247,27 +249,29 @@ def conclude(
     *,
     noise: Noise | None = None,
     found: Mismatch | None = None,
-    prior: Sip | None = None,
     machine: bool = False,
 ) -> Identification:
     """Return the identification from statistics that were gathered already, of several trials or of a stream of frames.
 
     ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count
-    noise alone, far too short, and the notes say so.
+    noise alone, far too short, and the notes say so; of a ``machine`` all that is known before is ``body.sip``.
     """
-    before = prior or widened_prior(body.sip, body.joint_errors)
-    tables, loads = possible_tables(before, body) if prior is None else {(False, False): before}, unknown_loads(body)
-    room = before if machine else with_room(before, loads)
+    before = body.sip if machine else widened_prior(body.sip, body.joint_errors)
+    room = before if machine else with_room(before, unknown_loads(body))
+    tables = {(False, False): before} if machine else possible_tables(before, body)
     got = discounted(total, noise or learn_noise(total, room), found, room)
-    if found is not None and not machine:
-        got = undo_dilution(body, total, got, found, tables, room, loads)
-    data = got.data
-    before, apart, chosen = more_probable_table(data, tables, body)
-    posterior = find_posterior(data, before)
-    fit = physical_fit(posterior, body)
-    base = estimate_base(data, structural_base(body))
+    done = _concluded(body, got, tables, trials, machine=machine)
+    return done if found else replace(done, notes=(NOISE_ALONE, *done.notes))
+
+
+def _concluded(
+    body: Body, got: Calibrated, tables: PossibleTables, trials: tuple[str, ...], *, machine: bool = False
+) -> Identification:
+    """Return the identification from calibrated data, under the one of the ``tables`` that they make most probable."""
+    before, apart, words = more_probable_table(got.data, tables, body)
+    posterior = find_posterior(got.data, before)
+    fit, base = physical_fit(posterior, body), estimate_base(got.data, structural_base(body))
     known: tuple[Known, ...] = ()
-    words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *chosen)
     if fit.status == "solved":
         first = before
         if not machine:
@@ -275,9 +279,8 @@ def conclude(
             first = from_true_centres(before, before, body.joint_errors)
         known = knowledge(fit.sip, first, posterior)
         words += _notes(known, fit)
-    return Identification(
-        body, posterior, data, base, got.noise, got.sizes, fit, trials, data.frames, known, words, apart, got.diluted
-    )
+    own = got.noise, got.sizes, fit, trials, got.data.frames, known, words, apart, got.diluted
+    return Identification(body, posterior, got.data, base, *own)
 
 
 def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:

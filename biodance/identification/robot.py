@@ -83,7 +83,7 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
     noise = learn_noise(total, body.sip, start=robot_start(body))
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
-    done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)
+    done = conclude(body, total, tuple(by_name), noise=noise, found=found, machine=True)
     return replace(done, notes=(*notes, *done.notes)), _as_the_paper(body, fits, about, done.base.base)
 
 

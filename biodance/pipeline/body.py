@@ -176,19 +176,22 @@ def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -
     return replace(wider, notes=(*body.notes, *map(_sentence, gains))), gains
 
 
-def force_gains(plain: Body, done: tuple[TrialResult, ...]) -> tuple[ForceGain, ...]:
-    """Return what the joints shown bring to the forces of every trial, against the ``plain`` body without them."""
-    forces = []
+def force_gains(plain: Body, done: tuple[TrialResult, ...], earlier: tuple[ForceGain, ...]) -> tuple[ForceGain, ...]:
+    """Return what the joints shown bring to the forces of every trial, against the ``plain`` body without them, whose
+    motion is that of ``earlier`` ones.
+    """
+    forces, known = [], {one.trial: one.plain for one in earlier}
     for one in done:
         compared = one.comparison
         if compared is None or one.trial.role == "static" or not compared.used.any():
             continue
         # the plain body follows the same markers: what it leaves of the forces is without the joints
-        motion = attempt([], "track", partial(track, plain, one.trial))
-        if motion is not None:
-            left = (compared.measured - predict_wrench(plain, motion).value)[compared.used, :3]
+        motion = None if one.name in known else attempt([], "track", partial(track, plain, one.trial))
+        needed = known.get(one.name) if motion is None else predict_wrench(plain, motion).value
+        if needed is not None:
+            left = (compared.measured - needed)[compared.used, :3]
             without = tuple(np.sqrt(np.mean(left**2, axis=0)).tolist())
-            forces.append(ForceGain(one.name, without, tuple(compared.rms[:3].tolist())))
+            forces.append(ForceGain(one.name, without, tuple(compared.rms[:3].tolist()), needed))
     return tuple(forces)
 
 

@@ -197,6 +197,7 @@ def followed(
     same = earlier.trials if earlier and placed is earlier.placed else tuple(repeat(None, len(read)))
     done = _examined(read, placed, mass, same, tell)
     steps, standing, limits = list(placed.steps), best_standing(done), session.settings.checks
+    before = earlier.joint_forces if earlier and placed is earlier.placed else ()
     weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
     return SessionResult(
         session,
@@ -207,7 +208,7 @@ def followed(
         standing=standing,
         weighed=weighed,
         corrections=corrections,
-        joint_forces=force_gains(placed.plain, done) if placed.plain is not None and placed.taken else (),
+        joint_forces=force_gains(placed.plain, done, before) if placed.plain is not None and placed.taken else (),
     )
 
 

@@ -160,13 +160,14 @@ class Weighing:
     trials: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ForceGain:
-    """RMS difference (N, x y z) of forces ``without`` and ``with_them``, the joints shown, by the table's masses."""
+    """RMS difference (N) of forces ``without`` and ``with_them``, the joints; ``plain`` (T, 6) wrench without them."""
 
     trial: str
     without: tuple[float, ...]
     with_them: tuple[float, ...]
+    plain: Array
 
 
 def forces_told(forces: Sequence[ForceGain]) -> tuple[str, ...]:
@@ -354,10 +355,9 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
     """
     if body is not None and motion is not None:
         return soles_from_body(body, motion)
-    markers = trial.markers
-    if markers is None:
+    if trial.markers is None:
         raise TrialRefused(f"Trial {trial.name}: it has no markers, so nobody knows where the feet are.")
-    return soles_from_markers(markers, read_marker_set(trial.marker_set))
+    return soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
 
 
 def at_an_end(trial: Trial, motion: Motion) -> Mask:

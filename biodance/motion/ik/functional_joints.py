@@ -356,26 +356,28 @@ def with_shown_joints(
     ``landmarks`` of the marker set: which labels mark the wrists.
     """
     some, gains, left = _sample(body, recorded), list[JointGain](), list(OPTIONAL_JOINTS)
+    before = None if some is None else _follow(body, some)
     while some is not None:
-        before = _follow(body, some)
         wider = [(name, with_optional(body, name, landmarks)) for name in left]
         # Markers of a body that was found too stiff elsewhere need be 15 mm off, not `NEED`.
         tried = [
-            pair
+            one
             for name, more in wider
             if more is not body
-            for pair in _tried(name, more, some, before, 0.015 if gains else NEED)
+            for one in _tried(name, more, some, before, 0.015 if gains else NEED)
         ]
-        more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
+        more, best, after = min(tried, key=lambda one: one[1].with_it / one[1].without, default=(body, None, before))
         if best is None or best.with_it >= _NEARER * best.without:
-            return body, (*gains, *(gain for _, gain in tried))
-        body, gains = more, [*gains, replace(best, taken=True)]
+            return body, (*gains, *(gain for _, gain, _ in tried))
+        body, before, gains = more, after, [*gains, replace(best, taken=True)]
         left.remove(best.name)
     return body, ()
 
 
-def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need: float) -> list[tuple[Body, JointGain]]:
-    """Return the body with one joint more and what it brings; nothing where no markers can show it, or none asks."""
+def _tried(
+    name: str, more: Body, some: _Sample, before: _Followed | None, need: float
+) -> list[tuple[Body, JointGain, _Followed]]:
+    """Return the body with one joint more, what that brings and how it follows; nothing where no markers ask for it."""
     worn = zip(more.markers.names, more.markers.segment, strict=True)
     told = [one for one, s in worn if one in some.markers and part_of(more.links[s]) in _TELLING[name]]
     if before is None or not told:
@@ -387,7 +389,7 @@ def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need:
     _, with_it = after.distances(told, some.trial)
     best = np.argsort(with_it / without)[: (len(without) + 1) // 2]
     all_of, foretold, better = (float(np.sqrt(np.mean(x**2))) for x in (fitted[best], without[best], with_it[best]))
-    return [(more, JointGain(name, tuple(told), all_of, foretold, better))]
+    return [(more, JointGain(name, tuple(told), all_of, foretold, better), after)]
 
 
 def _follow(body: Body, some: _Sample) -> _Followed | None:
