@@ -68,7 +68,7 @@ def _upper(what: str, where: str, value: float, limit: float, unit: str, advice:
     inside = bool(value <= limit)
     # as few digits as leave the printed value on the same side of its limit
     digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
-    return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:.3g} {unit}", inside, advice)
+    return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:.4g} {unit}", inside, advice)
 
 
 def _group_check(
