@@ -99,9 +99,12 @@ def _carried_by_plates(case: Case) -> _Carried | None:
             # own place: mean by force.
             corrected = (total[2] * _place(total) + lacks * place) / need[2]
             found[plate.name] = float(wrench[2] / right - 1), float((corrected - _place(need)) @ left)
+        away = float((place - _place(need)) @ left)
+        if abs(away) <= abs(off):
+            continue  # nothing on this plate takes the pressure of all so far aside
         # total off + more away = 0: what more on this plate puts the pressure of all under the body.
-        more = -total[2] * off / float((place - _place(need)) @ left)
-        if min(wrench[2] + more, wrench[2]) > 0:
+        more = -total[2] * off / away
+        if min(wrench[2], wrench[2] + more, total[2] + more) > 0:
             share, weight = wrench[2] / (wrench[2] + more), (total[2] + more) / need[2]
             placed[plate.name] = float(np.log(share)), float(np.log(weight))
     return _Carried(float(total[2] / need[2]), off, found, placed)
@@ -161,7 +164,7 @@ class PlateGain(InstalledPlate):
         wrong = {name: one for name, one in found.items() if abs(one.ratio - 1) > _RIGHT}
         right = [one.off for name, one in found.items() if name not in wrong]
         if "mass" in recorded.session.subject.guessed and right and abs(np.mean(right)) > _BESIDE * _SIDEWAYS:
-            return cls._unlike(found)  # no trial is right: these plates weighed the person
+            return cls._unlike(found, float(np.mean(right)))  # no trial is right: these plates weighed the person
         if right:
             each = ({name: one} for name, one in wrong.items())
             failed = [cls._reads(some, float(np.mean(right)), _AGAIN, tuple(some)) for some in each]
@@ -204,16 +207,17 @@ class PlateGain(InstalledPlate):
         )  # fmt: skip
 
     @classmethod
-    def _unlike(cls, found: Mapping[str, _Carried]) -> tuple[QualityCheck, ...]:
-        """Return the plate that reads another share of its loads than the others, if the pressure of all then lies
-        under the body in every trial, and weighs one person. Which of two it is, only the person's mass tells.
+    def _unlike(cls, found: Mapping[str, _Carried], beside: float) -> tuple[QualityCheck, ...]:
+        """Return the plate that reads another share of its loads than the others, if the pressure of all, now
+        ``beside`` the body (m), then lies under it in every trial, and weighs one person. Which of two it is, only the
+        person's mass tells.
         """
         ranked = []
         for name in next(iter(found.values())).placed:
             each = np.array([one.placed[name] for one in found.values() if name in one.placed])
             share = float(each[:, 0].mean())
             # In proportion to how far the pressure of all lies beside the body, which trials repeat to `_AGAIN`.
-            near = abs(share) * _BESIDE * _AGAIN / abs(np.mean([one.off for one in found.values()]))
+            near = abs(share / beside) * _BESIDE * _AGAIN
             alike = len(each) == len(found) > 1 and bool((np.ptp(each, axis=0) < [near, 2 * _RIGHT]).all())
             if alike and abs(np.expm1(share)) > _LARGE:
                 ranked.append((float(np.expm1(share)), name))
