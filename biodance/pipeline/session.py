@@ -78,7 +78,9 @@ def _placed(
     if earlier is not None:
         before = earlier.placed
         # scaling and joints rest on markers, person and hidden frames alone: equal ones give an equal body
-        same = earlier.subject == subject and before.known is known and all(map(np.array_equal, hidden, before.hidden))
+        # as mappings: what is unknown (NaN) of a person equals itself in them, and in records up to Python 3.12 alone
+        same = vars(earlier.subject) == vars(subject) and before.known is known
+        same = same and all(map(np.array_equal, hidden, before.hidden))
         if same and _same_markers(read, earlier.trials):
             return before
     steps: list[Step] = []
