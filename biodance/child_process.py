@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from multiprocessing import forkserver
 from pathlib import Path
 
@@ -42,14 +41,14 @@ def start_forkserver() -> None:
     """Start the process from which workers are forked: it leaves out the working folder, too. What this process starts
     otherwise is as before.
     """
-    before, alone = os.environ.get(_SAFE), threading.current_thread() is threading.main_thread()
+    before = os.environ.get(_SAFE)
     os.environ[_SAFE] = "1"
-    interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN) if alone else None  # Ctrl-C is for us to answer
+    # Ctrl-C is for us to answer: what is started here never hears it, and for us it waits until then
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         forkserver.ensure_running()
     finally:
-        if interrupt is not None:
-            signal.signal(signal.SIGINT, interrupt)
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
         if before is None:
             del os.environ[_SAFE]
         else:

@@ -141,9 +141,12 @@ def test_a_process_made_ready_does_every_run_and_is_replaced_once_it_was_killed(
 def test_ctrl_c_ends_a_window_as_it_should(archive, tmp_path):
     command = [sys.executable, "-m", "biodance", "app", str(archive.folder), "--no-browser", "--out", tmp_path / "out"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as window:
-        assert select.select([window.stdout], [], [], 120.0)[0]
-        window.send_signal(signal.SIGINT)
-        _, said = window.communicate(timeout=60)
+        try:
+            assert select.select([window.stdout], [], [], 120.0)[0]
+            window.send_signal(signal.SIGINT)
+            _, said = window.communicate(timeout=60)
+        finally:
+            window.kill()  # one that did not end would be waited for without end
     assert window.returncode == 0
     assert "Ctrl-C ends it" in said
     assert "Stopped" not in said
