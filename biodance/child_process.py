@@ -48,8 +48,8 @@ def start_forkserver() -> None:
     try:
         forkserver.ensure_running()
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
         if before is None:
             del os.environ[_SAFE]
         else:
             os.environ[_SAFE] = before
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)

@@ -3,14 +3,17 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 from small_dances import small_dance
 
 import biodance
+from biodance.child_process import start_forkserver
 from biodance.cli import app
 from biodance.records import Subject
 
@@ -119,3 +122,17 @@ def test_a_child_imports_biodance_and_nothing_of_the_working_folder(tmp_path: Pa
     own, standard = done.stdout.decode().split()
     assert Path(own).is_relative_to(CHECKOUT)
     assert not Path(standard).is_relative_to(tmp_path)
+
+
+def test_ctrl_c_waits_while_the_process_of_the_workers_is_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    started = []
+
+    def ensure_running() -> None:
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        started.append(True)
+
+    monkeypatch.setattr("multiprocessing.forkserver.ensure_running", ensure_running)
+    with pytest.raises(KeyboardInterrupt):
+        start_forkserver()
+    assert started == [True]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

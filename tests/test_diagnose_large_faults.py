@@ -23,6 +23,7 @@ from biodance.pipeline.judged_trials import recorded_of
 from biodance.pipeline.results import SessionDiagnosis
 from biodance.pipeline.session import examine
 from biodance.records import Plate, Wrench
+from biodance.report.write import write_diagnosis
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
@@ -200,7 +201,7 @@ def test_of_plates_that_weighed_the_person_one_reads_less_than_the_other(
     number: int, too_much: bool, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nobody declared a mass, so that the weight of no trial is right; where the pressure lies tells the plates apart,
-    and only the mass which of the two is wrong. Without it the person is weighed again.
+    and only the mass which of the two is wrong. Without it the person is weighed again, and nothing is proven.
     """
     monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
     for source in sorted((data / "subject4").iterdir()):
@@ -211,13 +212,19 @@ def test_of_plates_that_weighed_the_person_one_reads_less_than_the_other(
     (static,) = visit.of_role("static")
     weighed = static.wrench.value[:, 2].mean() / static.settings.gravity
     visit = replace(visit, subject=replace(visit.subject, mass=weighed))
-    found = diagnose_session(examine(visit))
+    result = examine(visit)
+    found = diagnose_session(result)
     less, more = ("plate2", "plate1") if (number == 2) != too_much else ("plate1", "plate2")
     first = found.findings[0]
     assert [(one.effect, one.target) for one in first.set] == [("plate_gain", less), ("plate_gain", more)]
     assert first.trials == ()
     assert first.parameters[0].value == pytest.approx(-0.3, abs=0.04)
     assert {one.effect for one in found.findings} <= {"plate_gain", "toe_landmark"}
+    assert "accept" not in found.diagnosis.attention[0].text
+    (tmp_path / "out").mkdir()
+    accepted = write_diagnosis(result, found, tmp_path / "out", accept=())["accepted"]
+    assert accepted["written"] == accepted["corrections"] == []
+    assert accepted["not_applied"][0]["why"] == f"nothing tells it from plate gain {more}"
 
 
 def test_what_is_undone_is_the_recording_again():

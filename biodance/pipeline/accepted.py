@@ -256,7 +256,7 @@ def with_proven_corrections(
     what is only suspected stays.
     """
     checks, inferred = diagnosed.mended.checks if diagnosed.mended else (), diagnosed.inferred
-    if any(one.alike for one in checks):
+    if diagnosed.mended and diagnosed.mended.unsure:
         return result
     undone = tuple(failed_check(one) for one in checks)
     own: tuple[Finding, ...] = ()

@@ -121,7 +121,8 @@ def _named(one: Diagnosis) -> Iterator[str]:
     first = one.faults[0]
     together = tuple(other for other in one.faults[1:] if other.effect == first.effect and names_markers(first))
     # what a check found is undone in a copy and judged there; all else goes by what it gains on data not used
-    put_right = any((check.effect, check.target) == (first.effect, first.target) for check in one.checks)
+    names = first.effect, first.target
+    put_right = any((check.effect, check.target) == names and not check.alike for check in one.checks)
     proven = put_right or (first.gain is not None and first.gain.proven)
     told, more = spoken(first, together, proven=proven), len(one.faults) - len(together)
     start = "" if more == 1 else f"{more} things are wrong. First, "

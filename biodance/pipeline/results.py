@@ -16,10 +16,12 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Gain, Residuals
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
+from biodance.display import cause_in_words
 from biodance.effects import QualityCheck
 from biodance.effects._base.exchanged_labels import Pair, Spans
 from biodance.identification.identification import Identification
 from biodance.inference.decision import Inferred
+from biodance.inference.hypotheses import Key
 from biodance.lab.plates.faults import PlateCorrection
 from biodance.motion.ik.functional_joints import JointGain
 from biodance.motion.newton import QuietStanding
@@ -192,6 +194,15 @@ class MendedCopy:
 
     exchanged: Mapping[str, Mapping[Pair, Spans]]
     checks: tuple[QualityCheck, ...]
+
+    @property
+    def unsure(self) -> dict[Key, str]:
+        """By cause that was undone although nothing tells it from others, which; nothing of the copy is proven then."""
+        return {
+            (one.effect, one.target): f"nothing tells it from {' or '.join(cause_in_words(*of) for of in one.alike)}"
+            for one in self.checks
+            if one.alike
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ class Weighing:
 
 @dataclass(frozen=True, eq=False)
 class ForceGain:
-    """RMS difference (N) of forces ``without`` and ``with_them``, the joints; ``plain`` (T, 6) wrench without them."""
+    """RMS difference (N) of forces ``without`` and ``with_them``, the joints; ``plain`` (T, 6) N, N·m without them."""
 
     trial: str
     without: tuple[float, ...]

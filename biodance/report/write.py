@@ -12,6 +12,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.display import cause_in_words, spaced
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
+from biodance.inference.hypotheses import Key
 from biodance.lab.plates.faults import APPLIED, PlateCorrection
 from biodance.lab.session.results_folder import made_folder
 from biodance.pipeline.accepted import CORRECTED, Written, accepted_corrections, write_corrected, write_mended
@@ -21,7 +22,7 @@ from biodance.pipeline.export import body_of_result
 from biodance.pipeline.judged_trials import failed_checks, identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text, read_lab
 from biodance.pipeline.movement import SessionMovement, account_for, describe_movement
-from biodance.pipeline.results import SessionDiagnosis, SessionResult
+from biodance.pipeline.results import MendedCopy, SessionDiagnosis, SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions, now, provenance
 from biodance.pipeline.session import identification_of
 from biodance.pipeline.still import replay_scene, stills_of
@@ -400,15 +401,15 @@ def _accepted(
     result: SessionResult, found: SessionDiagnosis, folder: Path, earlier: tuple[PlateCorrection, ...]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Write what is proven: corrected trials, copies; return acceptance in words, and files left to write."""
-    name, undone = f"session {result.session.folder.name}", found.mended.checks if found.mended else ()
-    findings, proven = _not_put_right(found, undone), found.gain is not None and found.gain.proven
-    copied, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
-    made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
+    name, mended = f"session {result.session.folder.name}", found.mended or MendedCopy({}, ())
+    unsure, undone = mended.unsure, () if mended.unsure else mended.checks
+    findings, proven = _not_put_right(found, mended.checks), found.gain is not None and found.gain.proven and not unsure
+    copied, kept = write_mended(result.session, mended, folder)
+    made = accepted_corrections((one for one in findings if one.gain and one.gain.proven and not unsure), name)
     files = _accepted_files(found if proven else None, findings, earlier, made, name)
     trials, refused, corrected = _corrected(result.session, undone, made, earlier, folder)
     written = (*copied, *(Written(file, what) for file, (_, what) in files.items()), *corrected)
-    left = _not_applied(findings, proven=proven)
-    others = {*left, *((one.effect, one.target) for one in made)}
+    others = {*(left := _not_applied(findings, unsure, proven=proven)), *((one.effect, one.target) for one in made)}
     document = {
         "files": [*sorted(files), *(one.file for one in copied)],
         "corrections": [*dict.fromkeys(f"{one.text} Put right in a copy." for one in undone), *map(str, made)],
@@ -423,8 +424,7 @@ def _accepted(
 
 def _not_put_right(found: SessionDiagnosis, undone: Sequence[QualityCheck]) -> tuple[Finding, ...]:
     """Return the faults that no check put right in a copy already."""
-    checks = (*undone, *(check for check in found.diagnosis.checks if check.mended))
-    right = {(check.effect, check.target) for check in checks}
+    right = {(c.effect, c.target) for c in (*undone, *(c for c in found.diagnosis.checks if c.mended))}
     return tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
 
 
@@ -465,21 +465,22 @@ def _corrected(
         Written(f"{CORRECTED}/session.toml", "subject and roles"),
     ]
     for name in trials:
-        own = [text for text, of in changes.items() if not of or name in of]
-        told = f"taken off: {'; '.join(own)}" if own else "as read: nothing was taken off"
-        written.append(Written(f"{CORRECTED}/{name}.c3d", told))
+        own = "; ".join(text for text, of in changes.items() if not of or name in of)
+        written.append(
+            Written(f"{CORRECTED}/{name}.c3d", f"taken off: {own}" if own else "as read: nothing was taken off")
+        )
     return trials, refused, tuple(written)
 
 
-def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[str, str], str]:
+def _not_applied(findings: tuple[Finding, ...], unsure: Mapping[Key, str], *, proven: bool) -> dict[Key, str]:
     """Return by cause why it was not accepted: corrections go by their own gain, all else by that of all."""
-    out = {}
+    out = dict(unsure)
     for one in findings:
         recorded = bool(accepted_corrections((one,), ""))
-        if one.gain is not None and one.gain.proven if recorded else proven and one.changes:
+        if not unsure and (one.gain is not None and one.gain.proven if recorded else proven and one.changes):
             continue
         why = "what it gains on data that were not used is not measured"
-        if one.gain:
+        if one.gain and not unsure:
             low, high = (100 * x for x in one.gain.ci95)
             why = f"on data that were not used it removes {low:.0f} to {high:.0f} % of the difference: no proven gain"
         out[one.effect, one.target] = why
